@@ -42,7 +42,7 @@ STYLE = (
 )
 
 
-def shown(thing: Displayed) -> str:
+def shown(displayed: Displayed) -> str:
     """Return the HTML with which a notebook shows an object of this package, such as a mechanism or a motion.
 
     Examples
@@ -52,54 +52,56 @@ def shown(thing: Displayed) -> str:
     >>> "Planar four-bar" in page, page.count("<table>")
     (True, 5)
     """
-    match thing:
+    match displayed:
         case Mechanism():
-            parts = _mechanism(thing)
+            parts = _mechanism(displayed)
         case Motion():
-            parts = _motion(thing)
+            parts = _motion(displayed)
         case Robot():
-            parts = _robot(thing)
+            parts = _robot(displayed)
         case JointTrajectory():
-            parts = _trajectory(thing)
+            parts = _trajectory(displayed)
         case Batch():
-            parts = _batch(thing)
+            parts = _batch(displayed)
         case Equilibrium():
-            parts = _equilibrium(thing)
+            parts = _equilibrium(displayed)
         case Linearization():
-            parts = _linearization(thing)
+            parts = _linearization(displayed)
         case Modes():
-            parts = _tables([modes_table(thing)])
+            parts = _tables([modes_table(displayed)])
         case Curve():
-            facts = curve_facts(thing)
+            facts = curve_facts(displayed)
             parts = [*_title(*(curve_summary(facts, "Curve").split("\n"))), *_tables(curve_tables(facts))]
         case OptimizedDesign():
-            design = design_facts(thing, "Optimized design")
+            design = design_facts(displayed, "Optimized design")
             parts = [*_title(*design_words(design).split("\n")), *_tables([design_table(design)])]
         case LimitReport():
             parts = [
-                *_title(thing.robot, *(verdict(thing).split("\n") if thing.limited else ["nothing has a limit"])),
-                *_tables([limits_table(thing)]),
+                *_title(
+                    displayed.robot, *(verdict(displayed).split("\n") if displayed.limited else ["nothing has a limit"])
+                ),
+                *_tables([limits_table(displayed)]),
             ]
         case _:
-            parts = _others(thing)
+            parts = _others(displayed)
     return f'<div class="jounce">{STYLE}{"".join(parts)}</div>'
 
 
-def _others(thing: Displayed) -> list[str]:
+def _others(displayed: Displayed) -> list[str]:
     """Return the HTML of the less common results."""
-    match thing:
+    match displayed:
         case Assemblies():
-            return _assemblies(thing)
+            return _assemblies(displayed)
         case RobotSimulation():
-            title = _title(*robot_motion_words(thing))
-            return [*title, *_tables([dataclasses.replace(peaks_table(table_peaks(thing.dataset)), title="Peaks")])]
+            title = _title(*robot_motion_words(displayed))
+            return [*title, *_tables([dataclasses.replace(peaks_table(table_peaks(displayed.dataset)), title="Peaks")])]
         case ToolPathMotion():
-            return _tool_path_motion(thing)
+            return _tool_path_motion(displayed)
         case JointPoses():
-            return _joint_poses(thing)
+            return _joint_poses(displayed)
         case PlateCam() | Feedforward():
-            return [*_title(repr(thing).strip("<>")), *_tables([_ranges(thing.dataset)])]
-    return _title(repr(thing).strip("<>"))
+            return [*_title(repr(displayed).strip("<>")), *_tables([_ranges(displayed.dataset)])]
+    return _title(repr(displayed).strip("<>"))
 
 
 def _text(value: object) -> str:

@@ -105,8 +105,8 @@ def _check_releases(client: Any, timeout: float) -> None:
         packages = worker["packages"] if isinstance(worker, dict) else {}
         for name, release in own.items():
             if packages.get(name) != release:
-                there = f"has {name} {packages[name]}" if packages.get(name) else f"has no {name}"
-                message = f"the worker {address} {there}, the client has {release}; all must have the same release"
+                installed = f"has {name} {packages[name]}" if packages.get(name) else f"has no {name}"
+                message = f"the worker {address} {installed}, the client has {release}; all must have the same release"
                 raise ClusterError(message, name="scheduler")
 
 

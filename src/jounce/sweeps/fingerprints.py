@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 
-def fingerprint(thing: Any) -> str:
+def fingerprint(value: Any) -> str:
     """Return a digest of all values in an object: the same in every process, and different for different values.
 
     Examples
@@ -19,44 +19,44 @@ def fingerprint(thing: Any) -> str:
     (True, False)
     """
     digest = hashlib.sha256()
-    _add(thing, digest.update, ())
+    _add(value, digest.update, ())
     return digest.hexdigest()
 
 
-def _add(thing: Any, put: Callable[[bytes], object], above: tuple[int, ...]) -> None:
+def _add(value: Any, put: Callable[[bytes], object], above: tuple[int, ...]) -> None:
     """Add the bytes of an object to a digest; `above` are the objects that contain it, to end cycles."""
-    put(f"<{type(thing).__module__}.{type(thing).__qualname__}>".encode())
-    if thing is None or isinstance(thing, bool | int | str | bytes | enum.Enum):
-        put(repr(thing).encode())
-    elif isinstance(thing, float | complex):
-        put(np.asarray(thing).tobytes())
-    elif isinstance(thing, type | types.BuiltinFunctionType | np.ufunc):
-        put(f"{getattr(thing, '__module__', '')}.{getattr(thing, '__qualname__', repr(thing))}".encode())
-    elif id(thing) in above:
-        put(f"circle {above[::-1].index(id(thing))}".encode())
+    put(f"<{type(value).__module__}.{type(value).__qualname__}>".encode())
+    if value is None or isinstance(value, bool | int | str | bytes | enum.Enum):
+        put(repr(value).encode())
+    elif isinstance(value, float | complex):
+        put(np.asarray(value).tobytes())
+    elif isinstance(value, type | types.BuiltinFunctionType | np.ufunc):
+        put(f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', repr(value))}".encode())
+    elif id(value) in above:
+        put(f"circle {above[::-1].index(id(value))}".encode())
     else:
-        for part in _parts(thing):
-            _add(part, put, (*above, id(thing)))
+        for part in _parts(value):
+            _add(part, put, (*above, id(value)))
     put(b";")
 
 
-def _parts(thing: Any) -> list[Any]:
+def _parts(value: Any) -> list[Any]:
     """Return the parts of an object."""
-    if isinstance(thing, Mapping):
-        return [part for pair in thing.items() for part in pair]
-    if isinstance(thing, list | tuple):
-        return [*thing]
-    if isinstance(thing, set | frozenset):
-        return sorted(thing, key=repr)
-    if isinstance(thing, np.ndarray | np.generic) or hasattr(thing, "__array__"):
-        array = np.asarray(thing)
+    if isinstance(value, Mapping):
+        return [part for pair in value.items() for part in pair]
+    if isinstance(value, list | tuple):
+        return [*value]
+    if isinstance(value, set | frozenset):
+        return sorted(value, key=repr)
+    if isinstance(value, np.ndarray | np.generic) or hasattr(value, "__array__"):
+        array = np.asarray(value)
         return [array.dtype.str, array.shape, array.tobytes()]
-    if isinstance(thing, types.FunctionType):
-        cells = [cell.cell_contents for cell in thing.__closure__ or ()]
-        return [thing.__module__, thing.__qualname__, thing.__defaults__, thing.__kwdefaults__, cells, thing.__code__]
-    if isinstance(thing, types.CodeType):
-        return [thing.co_code, thing.co_consts, thing.co_names]
-    if dataclasses.is_dataclass(thing):
-        return [getattr(thing, field.name, None) for field in dataclasses.fields(thing)]
-    made = thing.__reduce_ex__(4)
+    if isinstance(value, types.FunctionType):
+        cells = [cell.cell_contents for cell in value.__closure__ or ()]
+        return [value.__module__, value.__qualname__, value.__defaults__, value.__kwdefaults__, cells, value.__code__]
+    if isinstance(value, types.CodeType):
+        return [value.co_code, value.co_consts, value.co_names]
+    if dataclasses.is_dataclass(value):
+        return [getattr(value, field.name, None) for field in dataclasses.fields(value)]
+    made = value.__reduce_ex__(4)
     return [made] if isinstance(made, str) else list(made[:3])

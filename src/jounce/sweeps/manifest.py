@@ -124,10 +124,10 @@ def arithmetic() -> dict[str, str]:
     return {"machine code": code, "device": "cpu" if on_processor() else kind}
 
 
-def check_same_arithmetic(there: Mapping[str, Any], folder: str) -> None:
+def check_same_arithmetic(stored: Mapping[str, Any], folder: str) -> None:
     """Raise OutputError, with the differences, unless this process computes like the one that began a sweep."""
     own = versions()
-    if differences := _others(there.get("versions", own), own) + _others(there["arithmetic"], arithmetic()):
+    if differences := _others(stored.get("versions", own), own) + _others(stored["arithmetic"], arithmetic()):
         message = f"a worker rounds otherwise than what began the sweep: {'; '.join(differences)}"
         raise OutputError(f"{message}; install the same packages for both", path=folder)
 
@@ -140,9 +140,9 @@ def _named(files: Mapping[str, str]) -> dict[str, str]:
     return {Path(os.path.relpath(path, folder)).as_posix(): digest for path, digest in files.items()}
 
 
-def check_same(there: Mapping[str, Any], expected: Mapping[str, Any], folder: str) -> None:
+def check_same(stored: Mapping[str, Any], expected: Mapping[str, Any], folder: str) -> None:
     """Raise OutputError, with the differences, unless an existing sweep has the requested settings."""
-    differences = list(_differences(there, expected))
+    differences = list(_differences(stored, expected))
     if differences:
         message = (
             f"another sweep is there: {'; '.join(differences[:4])}; give another name, or the command that it was "
@@ -151,21 +151,21 @@ def check_same(there: Mapping[str, Any], expected: Mapping[str, Any], folder: st
         raise OutputError(message, path=folder)
 
 
-def _differences(there: Mapping[str, Any], expected: Mapping[str, Any]) -> list[str]:
+def _differences(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> list[str]:
     """Return the differences of two manifests in words."""
     differences = []
-    for name in there["files"] | expected["files"]:
-        before, now = there["files"].get(name), expected["files"].get(name)
+    for name in stored["files"] | expected["files"]:
+        before, now = stored["files"].get(name), expected["files"].get(name)
         if before != now:
             differences.append(
                 f"the file {name} {'was not read' if before is None else 'differs' if now else 'is not read'}"
             )
-    others = [{name: x.get(name) for name in ("sample", "time")} for x in (there, expected)]
-    for before, now in [*((there[group], expected[group]) for group in COMPARED), others]:
+    others = [{name: x.get(name) for name in ("sample", "time")} for x in (stored, expected)]
+    for before, now in [*((stored[group], expected[group]) for group in COMPARED), others]:
         differences += _others(before, now)
-    if list(there["vary"]) != list(expected["vary"]) and not differences:
-        differences.append(f"the order of what varies is {', '.join(there['vary'])} there")
-    if there["identity"] != expected["identity"] and not differences:
+    if list(stored["vary"]) != list(expected["vary"]) and not differences:
+        differences.append(f"the order of what varies is {', '.join(stored['vary'])} there")
+    if stored["identity"] != expected["identity"] and not differences:
         differences.append("the model has other values")
     return differences
 

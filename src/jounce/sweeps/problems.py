@@ -228,16 +228,16 @@ class Simulations(_OfMechanism):
         every, forward = np.union1d(self.instants, side_times), self.instants[0] <= self.instants[-1]
         grid = every if forward else every[::-1]
         simulated = simulate_batch(self.mechanism, designs, grid, self.order, **settings)
-        here, there = (np.searchsorted(every, x) for x in (self.instants, side_times))
+        indices, side_indices = (np.searchsorted(every, x) for x in (self.instants, side_times))
         if not forward:
-            here, there = len(every) - 1 - here, len(every) - 1 - there
+            indices, side_indices = len(every) - 1 - indices, len(every) - 1 - side_indices
         shapes = {quantity.name: quantity.shape for quantity in self.quantities()}
         whole = {name: x.reshape(*x.shape[:3], *shapes[name]) for name, x in simulated.outputs.items()}
         unknown = simulated.status != Status.OK
         for array in whole.values():
             array[unknown] = np.nan
-        others = {name: array[np.arange(len(side_times))[:, None], there] for name, array in whole.items()}
-        return {name: array[:, here] for name, array in whole.items()}, others, simulated.status[:, here]
+        others = {name: array[np.arange(len(side_times))[:, None], side_indices] for name, array in whole.items()}
+        return {name: array[:, indices] for name, array in whole.items()}, others, simulated.status[:, indices]
 
 
 def _chunks(side_times: Float[np.ndarray, "design side"], most: int) -> Iterator[slice]:
@@ -358,10 +358,10 @@ class Torques(Problem):
         for name in linear:
             share = self._torques(_with({name: 1.0}, bare), speed) - base
             torques = torques + designs[name][:, None, None, None] * share[which]
-        here, breaks = len(self.instants), self._instants_looked_at[1]
-        values = {name: torques[:, :here, :, k] for k, name in enumerate(self.robot.joint_names)}
-        one_sided = {name: torques[:, here:, :, k] for k, name in enumerate(self.robot.joint_names)}
-        status = np.full((count, here), int(Status.OK))
+        instant_count, breaks = len(self.instants), self._instants_looked_at[1]
+        values = {name: torques[:, :instant_count, :, k] for k, name in enumerate(self.robot.joint_names)}
+        one_sided = {name: torques[:, instant_count:, :, k] for k, name in enumerate(self.robot.joint_names)}
+        status = np.full((count, instant_count), int(Status.OK))
         sides = Sides(np.broadcast_to(breaks, (count, len(breaks))), one_sided)
         return Histories(values, status, designs.get("speed"), sides)
 

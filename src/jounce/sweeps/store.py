@@ -161,16 +161,16 @@ class Store:
     def _expected_content(self, path: Path, content: bytes) -> bytes | None:
         """Return the content that a file must have; None if it has it. Attributes added to the whole sweep stay."""
         try:
-            there = read_file(path, LARGEST_ROOT, error=OutputError, is_input=False)
+            existing = read_file(path, LARGEST_ROOT, error=OutputError, is_input=False)
         except OutputError:
             return content
-        if there == content:
+        if existing == content:
             return None
         if path.name != ROOT:
             return content
         expected = json.loads(content)
         try:
-            present = parsed(there, path)
+            present = parsed(existing, path)
         except OutputError:
             return content
         if path.parent == self.folder and isinstance(attributes := present.get("attributes"), dict):

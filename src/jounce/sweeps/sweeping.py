@@ -155,7 +155,7 @@ def prepare(
         As for `sweep`, except for errors of workers.
     """
     check_installed("zarr")
-    there = find(folder)
+    existing = find(folder)
     variations = read_variations(vary, problem.reader)
     unknown = [name for name in variations if name not in problem.nominal]
     if unknown:
@@ -163,17 +163,17 @@ def prepare(
     space = sample_space(variations, sample, problem.nominal)
     quantities = problem.quantities()
     instants = problem.instants
-    chunk = _chunk(chunk, there, space.count, quantities, len(instants) * problem.levels)
+    chunk = _chunk(chunk, existing, space.count, quantities, len(instants) * problem.levels)
     options = {**problem.options(), "histories": histories, "chunk": chunk}
     manifest = manifest_of(title, problem, files, space, instants, options)
     plan = Plan(problem, space, quantities, folder.absolute(), chunk, histories, manifest["identity"])
-    if there is None or (there.is_empty() and _differs(there, manifest, folder)):
+    if existing is None or (existing.is_empty() and _differs(existing, manifest, folder)):
         check_room(folder, plan.variables, space.count, chunk)
-        if there is not None:
-            there.remove()  # an earlier attempt without results
+        if existing is not None:
+            existing.remove()  # an earlier attempt without results
         create(folder, plan.files(manifest))
     else:
-        check_same(there.manifest, manifest, str(folder))
+        check_same(existing.manifest, manifest, str(folder))
     return plan
 
 
@@ -244,9 +244,9 @@ def opened(folder: Path) -> "xarray.Dataset":
     return xarray.open_zarr(folder, consolidated=True, chunks={} if _has_dask() else None)
 
 
-def _differs(there: Store, manifest: Mapping[str, Any], folder: Path) -> bool:
+def _differs(existing: Store, manifest: Mapping[str, Any], folder: Path) -> bool:
     try:
-        check_same(there.manifest, manifest, str(folder))
+        check_same(existing.manifest, manifest, str(folder))
     except OutputError:
         return True
     return False
@@ -319,12 +319,12 @@ def _title(mechanism: Mechanism) -> str:
     return getattr(mechanism, "title", "") or "designs of a mechanism"
 
 
-def _chunk(given: int | None, there: Store | None, count: int, quantities: Sequence[Quantity], rows: int) -> int:
+def _chunk(given: int | None, existing: Store | None, count: int, quantities: Sequence[Quantity], rows: int) -> int:
     """Return the number of designs of a chunk: the given one, that of a begun sweep, or by the size of results."""
     if given is not None:
         return whole_number("chunk", given, 1, LARGEST_CHUNK, error=MechanismError)
-    if there is not None:
-        return there.manifest["options"]["chunk"]
+    if existing is not None:
+        return existing.manifest["options"]["chunk"]
     numbers = rows * sum(math.prod(quantity.shape) for quantity in quantities)
     largest = min(USUAL_CHUNK, NUMBERS // numbers, max(4 * SMALLEST_CHUNK, -(-count // LEAST_CHUNKS)))
     return 1 << max(SMALLEST_CHUNK, largest).bit_length() - 1

@@ -148,19 +148,19 @@ def frames(subject: Subject) -> None:
     if subject.samples.kind.hidden:  # its coordinates, those of the last body, are not a position in space
         for name, series in moved.items():
             series[..., -1, :] = motion[name][..., -1, :]
-    here, there = residual(group, motion), residual(group, moved)
+    before, after = residual(group, motion), residual(group, moved)
     words = (
         "the residual changes where all bodies are moved together; take components along directions of a body, not of "
         "the global frame, or state relative=False where that is meant"
     )
     if period := subject.period_of(group):
-        subject.same(here[1:], there[1:], 1e-11, words)
-        turns = (here[0] - there[0]) / period
+        subject.same(before[1:], after[1:], 1e-11, words)
+        turns = (before[0] - after[0]) / period
         subject.same(turns, np.round(turns), 1e-12, words)
-    elif here.shape[1] == 1:
-        subject.same(here, there, 1e-12, words)
+    elif before.shape[1] == 1:
+        subject.same(before, after, 1e-12, words)
     else:
-        subject.same(_square(here), _square(there), 1e-11, words)
+        subject.same(_square(before), _square(after), 1e-11, words)
 
 
 def _square(rows: np.ndarray) -> np.ndarray:

@@ -85,9 +85,9 @@ def trace(
         curves = [traced(mechanism, time, driver=driver, order=order, count=points, length=length)]
         if circuits:
             chosen_circuits = assemblies(mechanism, time, driver=curves[0].driver).circuits
-            here = curves[0].coordinates_at(0.0)
+            start = curves[0].coordinates_at(0.0)
             curves += [
-                x.sampled(order, points) for x in chosen_circuits if not any(c.passes(here) for c in x.connected())
+                x.sampled(order, points) for x in chosen_circuits if not any(c.passes(start) for c in x.connected())
             ]
     return write_curves(curves, file, figure, show, output)
 

@@ -183,9 +183,9 @@ def refuse_name(name: str, known: Mapping[str, str], text: str) -> ExpressionErr
     kinds: dict[str, list[str]] = {}
     for each, kind in known.items():
         kinds.setdefault(kind, []).append(each)
-    there = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds.items())
+    known_names = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds.items())
     near = did_you_mean(name, known, limit=0)
-    return ExpressionError(f"unknown name '{name}' in {show_value(text)}; {near} {there}".replace(";  ", "; "))
+    return ExpressionError(f"unknown name '{name}' in {show_value(text)}; {near} {known_names}".replace(";  ", "; "))
 
 
 def varying_message(text: str) -> MechanismError:

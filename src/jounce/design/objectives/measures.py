@@ -163,8 +163,8 @@ def gaps(
     if times is not None:
         positions = [cells.at(float(time)) for time in times]
         index, shift = np.array([k for k, _ in positions]), np.array([h for _, h in positions])
-        there = value(series[:, :, index], jnp.asarray(shift)[None])
-        return there - points.T
+        values = value(series[:, :, index], jnp.asarray(shift)[None])
+        return values - points.T
     fixed = jax.lax.stop_gradient(series)
 
     def nearest(point: Any) -> tuple[Any, Any]:
@@ -176,8 +176,8 @@ def gaps(
         return jnp.asarray(cells.index)[nearest_index], shift[nearest_index]
 
     index, shift = jax.vmap(nearest)(jnp.asarray(points))
-    there = value(series[:, :, index], shift[None])
-    return there - points.T
+    values = value(series[:, :, index], shift[None])
+    return values - points.T
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

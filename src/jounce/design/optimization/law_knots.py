@@ -41,7 +41,7 @@ def _common(
     breaks = breaks_of_laws(mechanism, first, last, HIGHEST, forces=forces)
     ends = [mechanism.with_parameters(**{name: bound}) for name, pair in bounds.items() for bound in pair]
     for design in ends if len(breaks) else ():
-        there = breaks_of_laws(design, first, last, HIGHEST, forces=forces)
-        distances = np.abs(breaks[:, None] - there).min(axis=1, initial=np.inf)
+        jumps = breaks_of_laws(design, first, last, HIGHEST, forces=forces)
+        distances = np.abs(breaks[:, None] - jumps).min(axis=1, initial=np.inf)
         breaks = breaks[distances <= SAME * (abs(first) + abs(last))]
     return breaks

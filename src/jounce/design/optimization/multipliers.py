@@ -44,20 +44,20 @@ class Multipliers:
     """Multipliers of the active constraints of a design, by least squares with the required signs."""
 
     def __init__(
-        self, known: Known, here: Evaluation, numbers: Vector, slopes: list[Any], extremes: Vector, chosen: Any
+        self, known: Known, evaluation: Evaluation, numbers: Vector, slopes: list[Any], extremes: Vector, chosen: Any
     ):
-        self.known, self.here, self.numbers, self.extremes = known, here, numbers, extremes
+        self.known, self.evaluation, self.numbers, self.extremes = known, evaluation, numbers, extremes
         by_parameter, by_extreme, by_smooth = slopes
         self.by_extreme, self.chosen = by_extreme, chosen
-        self.fixed = by_parameter + by_smooth @ here.smooth_slopes
+        self.fixed = by_parameter + by_smooth @ evaluation.smooth_slopes
         free = np.setdiff1d(np.arange(len(extremes)), known.bounded)
-        self.fixed = self.fixed + by_extreme[:, free] @ here.row_slopes[chosen[free]]
+        self.fixed = self.fixed + by_extreme[:, free] @ evaluation.row_slopes[chosen[free]]
 
     def solved(self) -> tuple[float, Vector, Vector]:
         """Return the residual, and the multipliers of conditions and of bounds."""
         from scipy.optimize import nnls  # importing SciPy takes half a second
 
-        count, extra = len(self.here.point), len(self.known.bounded)
+        count, extra = len(self.evaluation.point), len(self.known.bounded)
         target = -np.concatenate([self.fixed[0], self.by_extreme[0, self.known.bounded]])
         parts = [*self._conditions(), *self._rows(extra), *self._bounds(count + extra), *self._singular(extra)]
         columns = np.stack([slope for slope, _, _ in parts], axis=1) if parts else np.zeros((len(target), 0))
@@ -86,22 +86,22 @@ class Multipliers:
 
     def _rows(self, extra: int) -> list[tuple[Vector, str, int]]:
         """Return the slopes of the largest values minus those of the variables that replace them."""
-        known, here = self.known, self.here
+        known, evaluation = self.known, self.evaluation
         rows = []
         for k, extreme in enumerate(known.bounded):
             close = known.owner == extreme
-            close &= here.rows > self.extremes[extreme] - ACTIVE * known.extreme_sizes[extreme]
-            rows += [(np.concatenate([row, -np.eye(extra)[k]]), "", 1) for row in here.row_slopes[close]]
+            close &= evaluation.rows > self.extremes[extreme] - ACTIVE * known.extreme_sizes[extreme]
+            rows += [(np.concatenate([row, -np.eye(extra)[k]]), "", 1) for row in evaluation.row_slopes[close]]
         return rows
 
     def _bounds(self, size: int) -> list[tuple[Vector, str, int]]:
         """Return the slopes of the active bounds."""
-        point = self.here.point
+        point = self.evaluation.point
         lower = [(-np.eye(size)[k], "bound", int(k) + 1) for k in np.flatnonzero(point <= ACTIVE)]
         return lower + [(np.eye(size)[k], "bound", -int(k) - 1) for k in np.flatnonzero(point >= 1.0 - ACTIVE)]
 
     def _singular(self, extra: int) -> list[tuple[Vector, str, int]]:
         """Return the slopes of the smallest singular values at their bound."""
         bound = self.known.clearance**2 * (1 + 1e-4)
-        rows = self.here.margin_slopes[self.here.margins < bound]
+        rows = self.evaluation.margin_slopes[self.evaluation.margins < bound]
         return [(np.concatenate([-slope, np.zeros(extra)]), "singular", 1) for slope in rows]

@@ -107,8 +107,8 @@ class Search:
         elastic : bool, default False
             Minimize the worst violation instead of the objective.
         """
-        here = self.problem.evaluate(point)
-        self._set_scales(here)
+        evaluation = self.problem.evaluate(point)
+        self._set_scales(evaluation)
         best, radius = point, 1.0
         if self.problem.goals.gaps is not None and not elastic:
             fitted = self.result_at(self._fitted(point))
@@ -140,12 +140,12 @@ class Search:
 
         def gaps(point: Vector) -> Vector:
             try:
-                here = self.problem.evaluate(point)
+                evaluation = self.problem.evaluate(point)
             except Locked:
                 return np.full(len(chosen), LOCKED * np.sqrt(self.scale))
             if self.watch is not None:
-                self.watch(self.problem.stated(point, here)[0], 0.0)
-            return here.smooth[chosen]
+                self.watch(self.problem.stated(point, evaluation)[0], 0.0)
+            return evaluation.smooth[chosen]
 
         def slopes(point: Vector) -> Float[np.ndarray, "gap parameter"]:
             return self.problem.evaluate(point).smooth_slopes[chosen]
@@ -159,22 +159,22 @@ class Search:
     def _fitness(self, point: Vector) -> tuple[float, float]:
         """Return the key that compares points: the worst violation, then the objective."""
         try:
-            here = self.problem.evaluate(point)
+            evaluation = self.problem.evaluate(point)
         except Locked:
             return np.inf, np.inf
-        numbers, _ = self.problem.numbers(point, self.problem.extremes(here)[0], here.smooth)
-        worst = max(self.near_singular(here), float(self.broken(numbers[1:]).max(initial=0.0)))
+        numbers, _ = self.problem.numbers(point, self.problem.extremes(evaluation)[0], evaluation.smooth)
+        worst = max(self.near_singular(evaluation), float(self.broken(numbers[1:]).max(initial=0.0)))
         return (worst if worst > CONDITION_TOLERANCE else 0.0), float(numbers[0])
 
     def result_at(self, point: Vector) -> SearchResult:
         """Return the result at a point: values, violations, multipliers."""
-        here = self.problem.evaluate(point)
-        extremes, chosen = self.problem.extremes(here)
-        numbers, slopes = self.problem.numbers(point, extremes, here.smooth)
-        broken = self.broken(numbers[1:], self._sizes_at(here))
-        near = self.near_singular(here)
-        kkt = Multipliers(self._known(float(numbers[0])), here, numbers, slopes, extremes, chosen)
-        return SearchResult(point, here, float(numbers[0]), broken, near, *kkt.solved())
+        evaluation = self.problem.evaluate(point)
+        extremes, chosen = self.problem.extremes(evaluation)
+        numbers, slopes = self.problem.numbers(point, extremes, evaluation.smooth)
+        broken = self.broken(numbers[1:], self._sizes_at(evaluation))
+        near = self.near_singular(evaluation)
+        kkt = Multipliers(self._known(float(numbers[0])), evaluation, numbers, slopes, extremes, chosen)
+        return SearchResult(point, evaluation, float(numbers[0]), broken, near, *kkt.solved())
 
     def _known(self, objective: float) -> Known:
         goals, size = self.problem.goals, abs(objective)
@@ -188,24 +188,24 @@ class Search:
         excess = np.where(self.equal, np.abs(numbers), np.maximum(numbers, 0.0))
         return excess / (self.sizes if sizes is None else sizes)
 
-    def _sizes_at(self, here: Evaluation) -> Vector:
+    def _sizes_at(self, evaluation: Evaluation) -> Vector:
         """Return the sizes of conditions at a design, or those at the start if a side is zero."""
-        pairs = np.abs(np.array(self.problem.stated(here.point, here)[2])).reshape(-1, 2)
+        pairs = np.abs(np.array(self.problem.stated(evaluation.point, evaluation)[2])).reshape(-1, 2)
         return np.where((pairs > 0).all(axis=1), np.minimum(pairs.max(axis=1, initial=0.0), self.sizes), self.sizes)
 
-    def near_singular(self, here: Evaluation) -> float:
+    def near_singular(self, evaluation: Evaluation) -> float:
         """Return the relative distance of the smallest singular value below its bound."""
-        least = float(np.sqrt(here.margins.min(initial=np.inf)))
+        least = float(np.sqrt(evaluation.margins.min(initial=np.inf)))
         return max(0.0, 1.0 - least / self.clearance) if self.clearance else 0.0
 
-    def _set_scales(self, here: Evaluation) -> None:
-        extremes, _ = self.problem.extremes(here)
-        objective, _, sides = self.problem.stated(here.point, here)
-        numbers, _ = self.problem.numbers(here.point, extremes, here.smooth)
+    def _set_scales(self, evaluation: Evaluation) -> None:
+        extremes, _ = self.problem.extremes(evaluation)
+        objective, _, sides = self.problem.stated(evaluation.point, evaluation)
+        numbers, _ = self.problem.numbers(evaluation.point, extremes, evaluation.smooth)
         self.scale = abs(float(numbers[0])) or abs(objective) or 1.0
         self.stated_scale = abs(objective) or self.scale
         self.sizes = np.array([max(map(abs, pair)) or 1.0 for pair in sides])
-        self.extreme_sizes = np.array([_size(here.rows[self.problem.owner == k]) for k in range(len(extremes))])
+        self.extreme_sizes = np.array([_size(evaluation.rows[self.problem.owner == k]) for k in range(len(extremes))])
 
 
 def _size(rows: Vector) -> float:
@@ -225,10 +225,10 @@ class _Run:
         )
         self.count = len(start)
         self.low, self.high = np.maximum(start - radius, 0.0), np.minimum(start + radius, 1.0)
-        here = self.problem.evaluate(start)
+        evaluation = self.problem.evaluate(start)
         self.extremes = search.bounded
-        numbers = self._extremes(here)[self.extremes] / search.extreme_sizes[self.extremes]
-        worst = self.merit_parts(here)[1] if elastic else 0.0
+        numbers = self._extremes(evaluation)[self.extremes] / search.extreme_sizes[self.extremes]
+        worst = self.merit_parts(evaluation)[1] if elastic else 0.0
         self.first = np.concatenate([start, numbers, [worst] * elastic])
         self.best, self._best_merit = start, self.merit_of(start)
         self.evaluations = 0
@@ -263,11 +263,11 @@ class _Run:
 
     # designs compared
 
-    def merit_parts(self, here: Evaluation) -> tuple[float, float]:
+    def merit_parts(self, evaluation: Evaluation) -> tuple[float, float]:
         """Return the objective and the worst violation, both relative."""
-        numbers, _ = self.problem.numbers(here.point, self._extremes(here), here.smooth)
+        numbers, _ = self.problem.numbers(evaluation.point, self._extremes(evaluation), evaluation.smooth)
         broken = self.search.broken(numbers[1:])
-        worst = max(float(broken.max(initial=0.0)), self.search.near_singular(here))
+        worst = max(float(broken.max(initial=0.0)), self.search.near_singular(evaluation))
         return float(numbers[0]) / self.search.scale, worst
 
     def merit_of(self, point: Vector) -> tuple[float, float]:
@@ -285,7 +285,7 @@ class _Run:
 
     def _seen(self, point: Vector) -> Evaluation:
         before = self.problem.evaluations
-        here = self.problem.evaluate(point)
+        evaluation = self.problem.evaluate(point)
         if self.problem.evaluations != before:
             self.evaluations += 1
             if self.evaluations > EACH * self.search.iterations:
@@ -294,30 +294,32 @@ class _Run:
             if merit < self._best_merit:
                 self.best, self._best_merit = np.array(point), merit
             if self.search.watch is not None:
-                self.search.watch(self.problem.stated(here.point, here)[0], self.merit_parts(here)[1])
-        return here
+                self.search.watch(self.problem.stated(evaluation.point, evaluation)[0], self.merit_parts(evaluation)[1])
+        return evaluation
 
     # functions for SLSQP
 
-    def _extremes(self, here: Evaluation) -> Vector:
-        return self.problem.extremes(here)[0]
+    def _extremes(self, evaluation: Evaluation) -> Vector:
+        return self.problem.extremes(evaluation)[0]
 
     def _split(self, variables: Vector) -> tuple[Evaluation, Vector]:
         """Return the evaluated design, and the extremes, some replaced by the variables of SLSQP."""
-        here = self._seen(np.clip(variables[: self.count], self.low, self.high))
-        extremes = self._extremes(here)
+        evaluation = self._seen(np.clip(variables[: self.count], self.low, self.high))
+        extremes = self._extremes(evaluation)
         own = variables[self.count : self.count + len(self.extremes)]
         extremes[self.extremes] = own * self.search.extreme_sizes[self.extremes]
-        return here, extremes
+        return evaluation, extremes
 
     def _goals(self, variables: Vector) -> tuple[Vector, Float[np.ndarray, "goal variable"]]:
         """Return the objective and conditions, and their slopes by the variables."""
-        here, extremes = self._split(variables)
-        numbers, (by_parameter, by_extreme, by_smooth) = self.problem.numbers(here.point, extremes, here.smooth)
-        slopes = by_parameter + by_smooth @ here.smooth_slopes
-        _, chosen = self.problem.extremes(here)
+        evaluation, extremes = self._split(variables)
+        numbers, (by_parameter, by_extreme, by_smooth) = self.problem.numbers(
+            evaluation.point, extremes, evaluation.smooth
+        )
+        slopes = by_parameter + by_smooth @ evaluation.smooth_slopes
+        _, chosen = self.problem.extremes(evaluation)
         free = np.setdiff1d(np.arange(len(extremes)), self.extremes)
-        slopes = slopes + by_extreme[:, free] @ here.row_slopes[chosen[free]]
+        slopes = slopes + by_extreme[:, free] @ evaluation.row_slopes[chosen[free]]
         own = by_extreme[:, self.extremes] * self.search.extreme_sizes[self.extremes]
         return numbers, np.concatenate([slopes, own, np.zeros((len(numbers), int(self.elastic)))], axis=1)
 
@@ -333,7 +335,7 @@ class _Run:
 
     def _inequalities(self, variables: Vector) -> tuple[Vector, Float[np.ndarray, "row variable"]]:
         """Return the rows that must not be negative: conditions, bounds of extremes minus rows, singular values."""
-        search, here = self.search, self._split(variables)[0]
+        search, evaluation = self.search, self._split(variables)[0]
         numbers, slopes = self._goals(variables)
         scaled, scaled_slopes = numbers[1:] / search.sizes, slopes[1:] / search.sizes[:, None]
         unequal = ~search.equal
@@ -345,12 +347,12 @@ class _Run:
         for k, extreme in enumerate(self.extremes):
             mine, size = self.problem.owner == extreme, search.extreme_sizes[extreme]
             rows = np.zeros((int(mine.sum()), len(variables)))
-            rows[:, : self.count] = -here.row_slopes[mine] / size
+            rows[:, : self.count] = -evaluation.row_slopes[mine] / size
             rows[:, self.count + k] = 1.0
-            parts.append((variables[self.count + k] - here.rows[mine] / size, rows))
+            parts.append((variables[self.count + k] - evaluation.rows[mine] / size, rows))
         if search.clearance:
-            padding = np.zeros((len(here.margins), len(variables) - self.count))
-            slack, slope = here.margins - search.clearance**2, here.margin_slopes
+            padding = np.zeros((len(evaluation.margins), len(variables) - self.count))
+            slack, slope = evaluation.margins - search.clearance**2, evaluation.margin_slopes
             parts.append((slack, np.concatenate([slope, padding], axis=1)))
         return np.concatenate([v for v, _ in parts]), np.concatenate([s for _, s in parts])
 

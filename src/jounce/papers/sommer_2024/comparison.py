@@ -99,8 +99,8 @@ def _tolerances(results: Sequence[Results], figure: int) -> tuple[str, bool, str
     if results[0].stop == "correction":
         return text, spread < ALIKE and floor <= FLOOR, "; the floor begins at another tolerance, see below"
     begins = PRINTED_FLOORS.get(figure, cases.TOLERANCES[0])
-    there = bool(reached) and max(reached) >= begins * (1 - ALMOST)
-    return text, there, f"; the paper has it at {begins:.0e}" if figure in PRINTED_FLOORS else ""
+    begins_alike = bool(reached) and max(reached) >= begins * (1 - ALMOST)
+    return text, begins_alike, f"; the paper has it at {begins:.0e}" if figure in PRINTED_FLOORS else ""
 
 
 def _steps(results: Sequence[Results], _: int) -> tuple[str, bool, str]:
@@ -133,6 +133,6 @@ def _lags(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
     for name, result in results.items():
         for lag in result.lags:
             late, wrong = lag.late(lag.difference), lag.measured_error(lag.difference)
-            there = f"{late:.6g}", f"{lag.expected:g}", f"{wrong:.4g}", f"{lag.error:.4g}"
+            lag_cells = f"{late:.6g}", f"{lag.expected:g}", f"{wrong:.4g}", f"{lag.error:.4g}"
             ours = f"{abs(lag.late(lag.simulated)):.0e}", f"{lag.measured_error(lag.simulated):.1e}"
-            yield cases.VALIDATION_CASES[name].title, lag.quantity, f"{lag.step:g}", *there, *ours
+            yield cases.VALIDATION_CASES[name].title, lag.quantity, f"{lag.step:g}", *lag_cells, *ours

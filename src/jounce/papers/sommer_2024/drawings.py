@@ -87,9 +87,9 @@ def draw(drawn: Mapping[str, Drawn], _: Any, *, title: str, note: str, size: tup
     """Draw one figure of the paper, a panel with a title for each mechanism, without results."""
     figure, axes = panels(1, len(drawn), size, title, note)
     drawings = []
-    for panel, (name, its) in zip(axes[0], drawn.items(), strict=True):
+    for panel, (name, shown) in zip(axes[0], drawn.items(), strict=True):
         panel.set_title(name)
-        drawings.append(_panel(panel, its, VIEW))
+        drawings.append(_panel(panel, shown, VIEW))
     for drawing in drawings:  # after all panels have their places
         drawing.write_names("all")
     return figure

@@ -139,10 +139,10 @@ class SpringDeflection:
         constant, stiffness = self.time_constant[self.damped], self.stiffness[self.damped]
         instants = np.concatenate([points_of(start, stop).reshape(-1), stop])
         torques = self.torques(instants)
-        values, there = torques[: -len(stop)].reshape(len(start), POINTS, self.levels, -1), torques[-len(stop) :]
+        values, stop_torques = torques[: -len(stop)].reshape(len(start), POINTS, self.levels, -1), torques[-len(stop) :]
         steps = (stop - start)[:, None] / constant
         gained = np.einsum("pjg,pglj->plj", mean_weights(steps), values[..., self.damped]) / stiffness
-        moved = there / self.stiffness
+        moved = stop_torques / self.stiffness
         moved[..., self.damped] = np.exp(-steps)[:, None] * deflection[between][..., self.damped] + gained
         deflection[between] = moved
         return deflection

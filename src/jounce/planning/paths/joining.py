@@ -129,8 +129,8 @@ def extended_path(path: Path, at: float, rate: float, laws: Sequence[SplineMotio
     named = zip(laws, path.laws.items(), strict=True)
     whole = Path({name: _joined_law(own, law, at, rate, until, stop) for own, (name, law) in named}, 0.0, stop)
     own = whole.derivatives(np.linspace(0.0, until, LOOKS), 0)[:, 0]
-    there = path.derivatives(np.linspace(path.start, path.stop, LOOKS), 0)[:, 0]
-    away = float(np.sqrt(((own[:, None] - there) ** 2).sum(axis=2)).min(axis=1).max())
+    path_points = path.derivatives(np.linspace(path.start, path.stop, LOOKS), 0)[:, 0]
+    away = float(np.sqrt(((own[:, None] - path_points) ** 2).sum(axis=2)).min(axis=1).max())
     words = f"from the running state onto the path, joined at s = {at:.6g}, at most {away:.2g} rad or m away from it"
     return dataclasses.replace(whole, deviation=path.deviation, allowed=path.allowed, words=words, joined=until)
 

@@ -241,8 +241,8 @@ def _accelerates_at_rests(path: Path, times: np.ndarray, rests: np.ndarray) -> b
     if not len(rests):
         return True
     typical = np.linalg.norm(path.derivatives(times, 2)[:, 2], axis=1).max()
-    there = np.linalg.norm(path.derivatives(rests, 2)[:, 2], axis=1)
-    return bool(there.min() > TURNING * typical)
+    second_derivatives = np.linalg.norm(path.derivatives(rests, 2)[:, 2], axis=1)
+    return bool(second_derivatives.min() > TURNING * typical)
 
 
 def _between(path: Path, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " interval"]:

@@ -62,8 +62,8 @@ def with_stops(path: Path, loads: Sequence[CarriedLoad], order: int) -> tuple[Pa
 
     def placed(load: CarriedLoad) -> CarriedLoad:
         ends = [end for end in ("start", "stop") if getattr(load, end) is not None]
-        there = parameter(np.array([getattr(load, end) for end in ends], float)).tolist()
-        return dataclasses.replace(load, **dict(zip(ends, there, strict=True)))
+        parameters = parameter(np.array([getattr(load, end) for end in ends], float)).tolist()
+        return dataclasses.replace(load, **dict(zip(ends, parameters, strict=True)))
 
     return stopped, tuple(placed(load) for load in loads)
 

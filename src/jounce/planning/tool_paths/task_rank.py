@@ -24,12 +24,12 @@ def _columns(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tuple[s
     tool, scale = constants
     q = arrays[0][0]
     frame = link_frame(tree, q[None], tool.frame)
-    here = {
+    goals = {
         "position": frame.position.coefficients[0][None],
         "rotation": jnp.stack([axis.coefficients[0] for axis in frame.axes], axis=1)[None],
         "direction": frame.direction(tool.axes[:, 2]).coefficients[0][None],
     }
-    goal: Goal = {kind: here[kind] for kind in kinds}
+    goal: Goal = {kind: goals[kind] for kind in kinds}
     scale = scale[:, None]
     return columns_of(lambda x: task_rows(tree, tool, (x * scale)[None], goal)[0], q / scale)[None]
 

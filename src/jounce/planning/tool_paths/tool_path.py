@@ -269,8 +269,8 @@ def _reach(progress: JointTrajectory) -> tuple[float, float]:
     low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, INSTANTS - 1)]
     for _ in range(ROUNDS):
         near = np.linspace(low, high, POINTS)
-        there = both(near.ravel()).reshape(*near.shape, 2)[:, :, [0, 1], [0, 1]]
-        largest, top = np.maximum(largest, there.max(axis=(0, 1))), np.argmax(there, axis=0)
+        refined = both(near.ravel()).reshape(*near.shape, 2)[:, :, [0, 1], [0, 1]]
+        largest, top = np.maximum(largest, refined.max(axis=(0, 1))), np.argmax(refined, axis=0)
         low, high = (np.take_along_axis(near, np.clip(top + step, 0, POINTS - 1)[None], axis=0)[0] for step in (-1, 1))
     return float(-largest[0]), float(largest[1])
 

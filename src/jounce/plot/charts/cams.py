@@ -98,11 +98,11 @@ def _draw_profile(axes: Any, cam: PlateCam, shown: ShownUnits) -> None:
 
 def _draw_follower(axes: Any, cam: PlateCam, factor: float) -> None:
     """Draw the follower at cam angle zero."""
-    follower, here = cam.follower, cam.at(0.0)
-    touch, center = here.profile[:, 0] * factor, here.pitch[:, 0] * factor
+    follower, state = cam.follower, cam.at(0.0)
+    touch, center = state.profile[:, 0] * factor, state.pitch[:, 0] * factor
     line = {"color": ORANGE, "linewidth": 1.4}
     reach = cam.base_radius * factor
-    coordinate = follower.start(cam.base_radius) + float(here.lift[0])
+    coordinate = follower.start(cam.base_radius) + float(state.lift[0])
     if isinstance(follower, OscillatingFollower):
         pivot = np.array([follower.center_distance * factor, 0.0])
         axes.plot(*pivot, marker="o", color=ORANGE, fillstyle="none", markersize=6)

@@ -81,17 +81,21 @@ class Panel(Observer):
             for parameter in parameters:
                 self._add_number(parameter)
 
-    def _add_slider(self, its: Parameter) -> None:
-        step = 1 if its.whole else _step(its.high - its.low)
-        hint = f"{its.name}, SI units; {its.value:.6g} in the file"
-        slider = self._sliders[its.name] = self.gui.add_slider(its.label, its.low, its.high, step, its.value, hint=hint)
-        slider.on_update(lambda event: self._changed(its.name, event))
+    def _add_slider(self, parameter: Parameter) -> None:
+        step = 1 if parameter.whole else _step(parameter.high - parameter.low)
+        hint = f"{parameter.name}, SI units; {parameter.value:.6g} in the file"
+        slider = self._sliders[parameter.name] = self.gui.add_slider(
+            parameter.label, parameter.low, parameter.high, step, parameter.value, hint=hint
+        )
+        slider.on_update(lambda event: self._changed(parameter.name, event))
 
-    def _add_number(self, its: Parameter) -> None:
-        step = 1 if its.whole else _step(abs(its.value) or 1.0)
-        number = self._numbers[its.name] = self.gui.add_number(its.label, its.value, step=step, disabled=its.derived)
-        if not its.derived:
-            number.on_update(lambda event: self._changed(its.name, event))
+    def _add_number(self, parameter: Parameter) -> None:
+        step = 1 if parameter.whole else _step(abs(parameter.value) or 1.0)
+        number = self._numbers[parameter.name] = self.gui.add_number(
+            parameter.label, parameter.value, step=step, disabled=parameter.derived
+        )
+        if not parameter.derived:
+            number.on_update(lambda event: self._changed(parameter.name, event))
 
     def _changed(self, name: str, event: Any) -> None:
         """Apply a value that the user has set with a slider or typed."""

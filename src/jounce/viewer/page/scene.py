@@ -74,12 +74,16 @@ class ViserScene:
         vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
         return self.scene.add_mesh_simple(name, vertices, faces, color=color, opacity=opacity, side="double")
 
-    def _connector(self, recording: Recording, its: Connector) -> tuple[Any, Vectors, Vectors]:
-        spring = its.kind == "spring"
-        mesh = coil(8, its.radius, 0.16 * its.radius) if spring else cylinder(its.radius, 1.0, center=(0, 0, 0.5))
-        handle = self._mesh(f"/connectors/{its.name}", mesh, its.color)
-        points = zip(its.bodies, its.points, strict=True)
-        ends = its.ends or tuple(recording.global_point(body, point) for body, point in points)
+    def _connector(self, recording: Recording, connector: Connector) -> tuple[Any, Vectors, Vectors]:
+        spring = connector.kind == "spring"
+        mesh = (
+            coil(8, connector.radius, 0.16 * connector.radius)
+            if spring
+            else cylinder(connector.radius, 1.0, center=(0, 0, 0.5))
+        )
+        handle = self._mesh(f"/connectors/{connector.name}", mesh, connector.color)
+        points = zip(connector.bodies, connector.points, strict=True)
+        ends = connector.ends or tuple(recording.global_point(body, point) for body, point in points)
         start, end = (center + 0.85 * in_front(recording) for center in ends)
         return handle, start, end
 

@@ -78,19 +78,23 @@ def _plates_and_wheels(skeleton: Skeleton, layer: Mapping[str, float], colors: M
             yield body, wheel(1.6 * WIDTH * size, low, high, link.points[0]), colors[body]
 
 
-def _wheel(its: Wheel, low: float, high: float, color: Color) -> Pieces:
+def _wheel(gear_wheel: Wheel, low: float, high: float, color: Color) -> Pieces:
     """Yield a wheel with its teeth, and a mark that shows its rotation."""
-    radius, (x, y) = its.radius, its.center.tolist()
-    module = 0.0 if its.partner is None else min(radius, its.partner) / 9
-    if its.internal:
-        yield its.body, wheel(radius, low, high, its.center, module=module, outside=1.16 * radius), color
+    radius, (x, y) = gear_wheel.radius, gear_wheel.center.tolist()
+    module = 0.0 if gear_wheel.partner is None else min(radius, gear_wheel.partner) / 9
+    if gear_wheel.internal:
+        yield gear_wheel.body, wheel(radius, low, high, gear_wheel.center, module=module, outside=1.16 * radius), color
         mark, long = 1.09 * radius, 0.12 * radius
     else:
         red, green, blue = (int(c + 0.35 * (255 - c)) for c in color)
-        yield its.body, wheel(radius, low, high, its.center, module=module), color
-        yield its.body, wheel(0.62 * radius, low, high + 0.1 * (high - low), its.center), (red, green, blue)
+        yield gear_wheel.body, wheel(radius, low, high, gear_wheel.center, module=module), color
+        yield (
+            gear_wheel.body,
+            wheel(0.62 * radius, low, high + 0.1 * (high - low), gear_wheel.center),
+            (red, green, blue),
+        )
         mark, long = 0.5 * radius, 0.9 * radius
-    yield its.body, box([long, 0.1 * radius, 0.2 * (high - low)], [x + mark, y, high]), DARK
+    yield gear_wheel.body, box([long, 0.1 * radius, 0.2 * (high - low)], [x + mark, y, high]), DARK
 
 
 def _pedestal(point: Point, size: float, low: float) -> Trimesh:

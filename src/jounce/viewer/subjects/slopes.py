@@ -76,9 +76,11 @@ def peak_slopes(motion: Motion, name: str, order: int) -> PeakSlopes:
     scalars = scalar_outputs(motion)
     check_name("output", name, scalars, JounceError, name="output")
     stem, _ = scalars[name]
-    its = [peak for peak in peaks(motion) if peak.output == name][order]
-    low = abs(its.minimum) > abs(its.maximum)
-    instant, sign = (its.minimum_at, np.sign(its.minimum)) if low else (its.maximum_at, np.sign(its.maximum))
+    extreme = [peak for peak in peaks(motion) if peak.output == name][order]
+    low = abs(extreme.minimum) > abs(extreme.maximum)
+    instant, sign = (
+        (extreme.minimum_at, np.sign(extreme.minimum)) if low else (extreme.maximum_at, np.sign(extreme.maximum))
+    )
     mechanism, first = motion.mechanism, float(motion.time[0])
     times = [first] if instant == first else [first, instant]
     alike = [column for column, (output, _) in scalars.items() if output == stem]
@@ -90,9 +92,9 @@ def peak_slopes(motion: Motion, name: str, order: int) -> PeakSlopes:
 
     given = {k: x for k, x in mechanism.parameters.items() if not isinstance(x, str | Expression)}
     gradient = jax.grad(height)({name: jnp.asarray(mechanism.parameter_values[name], float) for name in given})
-    unit, factor = mechanism.shown_units.of(its.unit, stem)
+    unit, factor = mechanism.shown_units.of(extreme.unit, stem)
     slopes = {name: float(slope) * factor for name, slope in gradient.items()}
-    return PeakSlopes(abs(its.minimum if low else its.maximum) * factor, unit, instant, slopes)
+    return PeakSlopes(abs(extreme.minimum if low else extreme.maximum) * factor, unit, instant, slopes)
 
 
 def can_be_differentiated(subject: Any) -> bool:

@@ -113,8 +113,8 @@ def symbolic_joint(group: Group, pose_type: type, order: int) -> SymbolicJoint:
         {name: tuple(evaluated(graph, n, known) for n in parts) for parts, name in reader.derived.items()}
         for known in values
     ]
-    for known, its in zip(values, derived, strict=True):
-        known |= {("v", name, c): part for name, parts in its.items() for c, part in enumerate(parts)}
+    for known, derived_vectors in zip(values, derived, strict=True):
+        known |= {("v", name, c): part for name, parts in derived_vectors.items() for c, part in enumerate(parts)}
     constants = [[evaluated(graph, number, known) for number in read.constants] for known in values]
     vectors |= {name: name[-1] for name in reader.derived.values()}
     return SymbolicJoint(rows, vectors, planar, slots, constants, derived)

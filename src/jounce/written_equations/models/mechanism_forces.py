@@ -120,8 +120,8 @@ def output_function(mechanism: Mechanism, model: Model, inputs: Inputs) -> tuple
             series = inputs.series([order + 1], order)
             (entries,) = _read(GraphReader(inputs.graph), model, value, series, names=names)
             values = _times(inputs, entries.numbers[..., 0], math.factorial(k))
-            for i, its in enumerate(rows):
-                for c, row in enumerate(its):
+            for i, components in enumerate(rows):
+                for c, row in enumerate(components):
                     columns.setdefault(row, []).append(int(values[c, i]))
     if not columns:
         message = "no output of this mechanism follows from places and motions of bodies alone"
