@@ -36,11 +36,11 @@ from jounce.trajectory import FollowingMotion, JointTrajectory
 from jounce.trajectory.checks import positive
 
 CELLS = 160
-ATTEMPTS = 4  # to keep limits of the derivatives in time
-LIMIT_TOLERANCE = 1e-9  # of a limit, which rounding may take
+ATTEMPTS = 4  # attempts to keep limits of the time derivatives
+LIMIT_TOLERANCE = 1e-9  # relative tolerance of a limit for rounding
 MAX_ORDER = 6
-NEAR_LEAST = 1.01  # times the least time: a duration below it is compared with that exactly
-SPEEDS = 1e-9  # of the largest: what is slower at an end of a trajectory is at rest
+NEAR_LEAST = 1.01  # times the least time: a shorter duration is compared with the exact least time
+SPEEDS = 1e-9  # relative to the largest speed: slower ends of a trajectory are at rest
 
 
 @concrete
@@ -65,77 +65,78 @@ def retime(
 ) -> RetimedTrajectory:
     """Return the fastest motion along a path that keeps limits.
 
-    The square of the rate along the path is a spline, found by a sequence of cone programs whose coefficients are exact
-    derivatives of the path and of the torques along it. What is returned is checked: no limit is exceeded by more than
-    a millionth, between samples either.
+    The square of the rate along the path is a spline from a sequence of cone programs, whose coefficients are exact
+    derivatives of the path and of the torques along it. The result is checked: it exceeds no limit by more than a
+    millionth, also between samples.
 
     Parameters
     ----------
     robot : Robot or Mechanism
-        The robot, with what it holds; or a mechanism, whose drivers' laws, over its time, are the path.
+        The robot, with its payload; or a mechanism, with the laws of its drivers over its time as the path.
     path : JointTrajectory, dict, or array_like of shape (points, joints)
-        None for a mechanism. Waypoints, with splines of degree 5 through them; a mapping from names of joints to
-        waypoints or to expressions of ``s``, which runs from 0 to 1; or a trajectory, whose times do not count: the
-        motion stops where it turns back or stops at a corner. Joints that it does not name stand still.
+        None for a mechanism. Waypoints, interpolated by splines of degree 5; a mapping from names of joints to
+        waypoints or to expressions of ``s``, which runs from 0 to 1; or a trajectory, whose times have no effect: the
+        motion stops where the trajectory turns back or stops at a corner. Joints that it does not name stand still.
     limits : dict of str to Limits, or MotionLimits, optional
-        In place of those that the robot has. For a mechanism `Limits` by name of drivers (effort and effort_rate are
-        its force or torque, and yank) and of outputs, whose speed, acceleration and, for angles and distances, jerk
-        are limited.
+        Limits that replace those of the robot. For a mechanism, `Limits` by name of drivers (effort and effort_rate
+        limit the force or torque, and its rate) and of outputs, which can have limits of speed, acceleration and, for
+        angles and distances, jerk.
     names : sequence of str, optional
-        Joints of an array of waypoints, in the order of its columns; those of the robot unless given.
+        Joints of an array of waypoints, in the order of its columns; the joints of the robot unless given.
     rates : tuple of float, default (0, 0)
         Rates of s at the beginning and at the end, 1/s; 0 is rest.
     order : int, optional
-        Highest derivative of the positions that is continuous, 1 to 6, also where the motion comes from rest. Unless
-        given, as many as the limits require: 3 with limits of jounce, 2 of jerk or torque rate, 1 otherwise.
+        Highest continuous derivative of the positions, 1 to 6, also at the start from rest. By default as high as the
+        limits require: 3 with limits of jounce, 2 with limits of jerk or torque rate, 1 otherwise.
     cells : int, optional
-        Cells of the spline, 20 or more. Unless given, 160, or as many as resolve how the path waves, up to 1280. With a
-        number that is given, and for a mechanism, which has 160, that is not looked at: between the instants of the
-        check a path that waves more finely than these may exceed limits.
+        Number of cells of the spline, 20 or more. By default 160, or enough to resolve oscillations of the path, up to
+        1280. A given number, and the 160 cells of a mechanism, ignore oscillations: a path with finer oscillations may
+        exceed limits between the instants of the check.
     drives : bool, default True
         Whether torques contain armature inertia, damping and friction of the drives.
     repair : bool, default False
-        Return the given trajectory, which must be one, with the smallest slowing that keeps the limits: it is nowhere
-        faster than it was, and as it was where that keeps them.
+        Whether to return the given trajectory with the smallest slowing that keeps the limits: it is never faster than
+        before, and unchanged where it keeps the limits. The path must be a trajectory.
     deviation : float, optional
-        How far from the straight lines between samples or waypoints the path may be, rad or m (of several joints the
-        root of the sum of squares). Samples of a trajectory unless given 0.001, or a thousandth of the diagonal of the
-        box that holds them if that is less: splines go through them where these keep within it, stand still where the
-        samples do, and are supported by the samples to the order; else a spline whose control points lie on the lines,
-        which rounds corners and what noise and rounding make of dwells. Through waypoints go splines unless it is
-        given. A path of expressions or laws is itself what is deviated from, so that kinks can be rounded.
+        Largest distance of the path from the straight lines between samples or waypoints, rad or m (for several joints
+        the root of the sum of squares). The default for samples of a trajectory is 0.001, or a thousandth of the
+        diagonal of their bounding box if that is less. Splines interpolate the samples if they keep the deviation,
+        stand still where the samples do, and are supported by the samples to the order; otherwise the path is a spline
+        with control points on the lines, which rounds corners and the noise of dwells. Waypoints are interpolated
+        unless the deviation is given. For a path of expressions or laws the deviation is relative to that path, so that
+        kinks can be rounded.
     parameter : array_like of shape (points,), optional
-        Values of s at waypoints, increasing; the lengths of the chords between them, from 0 to 1, unless given.
+        Increasing values of s at waypoints; the chord lengths between them, from 0 to 1, unless given.
     degree : int, optional
-        Of the splines through waypoints, with not-a-knot ends; 5 unless given. With a parameter and degree 3 the path
-        is that of TOPP-RA's ``SplineInterpolator``.
+        Degree of the splines through waypoints, with not-a-knot ends; 5 unless given. With a parameter and degree 3 the
+        path is that of TOPP-RA's ``SplineInterpolator``.
     hand_over : bool, default False
-        Whether a trajectory that is repaired may start and stop in motion, as of a robot that moves already.
+        Whether a repaired trajectory may start and stop in motion, as for a robot that already moves.
     duration : float, optional
-        How long the motion is to take, s, in place of as little as it can: the fastest motion slowed evenly, or where
-        rates are given at the ends one that is as slow as it may be everywhere.
+        Duration of the motion, s, instead of the least time: the fastest motion slowed evenly, or, with given rates at
+        the ends, a motion that is as slow as possible everywhere.
     state : array_like of shape (derivatives, joints), optional
-        Of a robot that runs already: positions and velocities, and if known accelerations and jerks, with which the
-        motion begins, of the joints of the path in its order, at their limits too. If it is not on the path, a curve
-        leads onto it, on which the robot may brake and turn, and joins it at the first of some places from which a
-        motion is found that keeps the limits. What exceeds a limit by less than a millionth is taken for rounding.
+        State of a running robot at the beginning of the motion: positions, velocities, and if known accelerations and
+        jerks, of the joints of the path in its order, also at their limits. If the state is not on the path, a curve
+        leads onto the path, on which the robot may brake and turn. The curve joins the path at the first of several
+        places from which some motion keeps the limits. An excess below a millionth of a limit counts as rounding.
     loads : sequence of CarriedLoad, optional
-        What links carry on parts of the path, as from the second waypoint to the fourth: limits of torques and of their
-        rates hold on both sides of each change. The motion stops there, unless the load is said to be ``moving``; a
-        repaired trajectory stops only where it did. Torques step as the load changes, so that their rate is infinite
-        then: the report states by how much they step, and how fast the load moves.
+        Loads on links on parts of the path, as from the second waypoint to the fourth: limits of torques and of their
+        rates apply on both sides of each change. The motion stops at a change, unless the load is ``moving``; a
+        repaired trajectory stops only where it stopped before. Torques step at a change of load, so that their rate is
+        infinite: the report states the step, and the speed of the load.
 
     Returns
     -------
     RetimedTrajectory
-        A `JointTrajectory` that starts at 0 s, exact between samples. Its ``report`` is what `check_limits` finds, its
-        ``active`` says which limit binds where, and how much time it costs.
+        A `JointTrajectory` that starts at 0 s, exact between samples. ``report`` is the result of `check_limits`;
+        ``active`` has the binding limits on the path, and the time that each of them costs.
 
     Raises
     ------
     TrajectoryError
-        If the path has a kink or a repeated point, leaves the range of a joint, or needs more than a limit at rest: the
-        message says where, and which joint. If the duration is shorter than the least time, which it names.
+        If the path has a kink or a repeated point, leaves the range of a joint, or exceeds a limit at rest: the message
+        has the place and the joint. If the duration is shorter than the least time, which the message has.
     RobotError
         If names or limits do not fit the robot.
     SolveError
@@ -183,7 +184,7 @@ def retime(
 
     def planned(along: Path, conditions: Conditions, until: float | None) -> RetimedTrajectory:
         source = quantities(along)
-        if until is None:  # a curve that was joined to a path is known to be smooth
+        if until is None:  # a curve joined to a path is already smooth
             checked(along, chosen)
         source.check_range()
         own_cells = cells or cells_needed(along, chosen)
@@ -207,7 +208,7 @@ def _quantities(
 
 
 def _check_of_robots(given: Mapping[str, bool], between: Between) -> None:
-    """Raise TrajectoryError if something was given that a mechanism does not have."""
+    """Raise TrajectoryError for arguments that do not apply to a mechanism."""
     if any(given.values()):
         message = "the path of a mechanism is that of its drivers, which is not repaired; leave this out"
         raise TrajectoryError(message, name=next(name for name, x in given.items() if x))
@@ -215,7 +216,7 @@ def _check_of_robots(given: Mapping[str, bool], between: Between) -> None:
 
 
 def _check_not_repaired(**given: Any) -> None:
-    """Raise TrajectoryError if something was given that a trajectory that is repaired has itself."""
+    """Raise TrajectoryError for arguments that a repaired trajectory determines itself."""
     for name, value in given.items():
         if value is not None:
             message = (
@@ -268,19 +269,19 @@ def _repaired(
     conditions = Conditions(chosen, (first, last), max_rate=1.0)
     law, search = slowed_only(source, source.labels, path.start, path.stop, conditions, cells)
     retimed = _certified(robot, path, law, search=search, source=source, drives=drives, hand_over=True)
-    # what samples make of rest is known of the given laws only, not of those that follow the slowed time
+    # rest in samples is known for the given laws only, not for the laws of the slowed time
     known_ends = ends if all(end.at_rest for end in ends) else retimed.report.ends
     retimed.report = dataclasses.replace(retimed.report, ends=known_ends, hand_over=hand_over)
     return retimed
 
 
 def _ends(robot: Robot, given: JointTrajectory, source: RobotQuantities, drives: bool, hand_over: bool) -> Any:
-    """Return the ends of a trajectory that is to be repaired.
+    """Return the ends of a trajectory before its repair.
 
     Raises
     ------
     TrajectoryError
-        If it jumps there, and the robot does not move already.
+        If the motion jumps at an end, and the robot does not already move.
     """
     ends = check_motion(robot, given, source.limits, drives=drives).ends
     for end in () if hand_over else ends:
@@ -296,7 +297,7 @@ def _ends(robot: Robot, given: JointTrajectory, source: RobotQuantities, drives:
 
 
 def within_limits(source: RobotQuantities, s: np.ndarray) -> np.ndarray:
-    """Return where a motion whose parameter is the time keeps its limits."""
+    """Return whether a motion with the time as parameter keeps its limits, at values of s."""
     shape, law = np.zeros((5, len(s))), np.zeros((4, len(s)))
     shape[0], shape[1], law[0] = s, 1.0, 1.0
     return np.all(Curves(source(s), shape).ratios(law) <= 1, axis=1)
@@ -312,7 +313,7 @@ def _certified(
     drives: bool,
     hand_over: bool,
 ) -> RetimedTrajectory:
-    """Return the trajectory of a law, once its own derivatives in time keep the limits."""
+    """Return the trajectory of a law whose time derivatives keep the limits."""
     for attempt in range(ATTEMPTS):
         motion = RateMotion(np.linspace(0.0, 1.0, law.basis.cells + 1), law.basis.pieces(law.coefficients))
         if search.duration is not None and not any(search.conditions.rates):
@@ -344,7 +345,7 @@ def _of_mechanism(limits: GivenLimits | None) -> dict[str, Limits]:
 
 
 def _order(order: int | None, limits: MotionLimits, robot: Robot) -> int:
-    """Return up to which derivative a motion must be continuous."""
+    """Return the highest derivative that must be continuous."""
     least = 1
     given = [*(limits.joints[name] for name in robot.joint_names), *SharedFollowers.of(robot).limits.values()]
     varying = {field for laws in limits.varying.values() for field in laws}

@@ -1,4 +1,4 @@
-"""Joint motion along a path of a tool, with all derivatives: Negrean 2025, equation 60, and what redundancy leaves."""
+"""Joint motion along a path of a tool, with all derivatives, also for redundant robots: Negrean 2025, equation 60."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -27,7 +27,7 @@ from jounce.robot.robot import Robot
 from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.trajectory.labels import in_order
 
-REACHED = 1e-10  # rad, or sizes of the robot
+REACHED = 1e-10  # rad, or relative to the size of the robot
 
 
 def follow_tool_path(
@@ -48,8 +48,8 @@ def follow_tool_path(
 ) -> ToolPathMotion:
     """Return the joint coordinates that lead a tool along a path, with derivatives of any order.
 
-    At each instant one factored matrix gives all derivatives, order after order. From the start on the path is followed
-    on one branch: over no interval can the coordinates come to another one.
+    At each instant one factored matrix gives all derivatives, order after order. The motion follows the branch of the
+    start: the coordinates cannot change to another branch over any interval.
 
     Parameters
     ----------
@@ -58,27 +58,28 @@ def follow_tool_path(
     link : str
         The link that carries the tool.
     path : ToolPath
-        Of the tool.
+        Path of the tool.
     time : array_like of shape (time,), optional
         Instants within the path, s; 201 evenly spaced ones unless given.
     order : int, default 4
         Highest derivative.
     axis, point : array_like of shape (3,)
-        Of the tool, in the frame of the link; m. The axis is the one that has a direction.
+        Axis and point (m) of the tool in the frame of the link. The path gives the direction of the axis.
     start : array_like of shape (n,), optional
-        Coordinates near those at the first instant, rad or m: they choose the branch. Found by `inverse_kinematics`
-        unless given.
+        Coordinates near those at the first instant, rad or m, which select the branch; from `inverse_kinematics` unless
+        given.
     hold : mapping of str to law, optional
         Joints with a law of their own: a number, an expression of ``t``, or a motion.
     posture : array_like of shape (n,), optional
-        For a redundant robot: the coordinates are those of the task that are nearest to it. They depend on the path
-        only, so that a closed path ends where it began. The middle of the ranges of the joints unless given.
+        Posture of a redundant robot, to which the coordinates are as near as the task allows. The coordinates then
+        depend on the path only, so that a closed path ends where it began. The middle of the ranges of the joints
+        unless given.
     weights : array_like of shape (n,), optional
-        Of the squared distances of the joints from the posture; 1 unless given.
+        Weights of the squared distances of the joints from the posture; 1 unless given.
     limits : bool, default True
-        Whether coordinates out of the ranges of the joints are failures.
+        Whether coordinates outside the ranges of the joints are failures.
     strict : bool, default True
-        Raise where the path cannot be followed; otherwise those instants are NaN.
+        Whether to raise an error if the tool cannot follow the path; otherwise those instants are NaN.
 
     Returns
     -------
@@ -90,9 +91,9 @@ def follow_tool_path(
     RobotError
         If an argument does not fit the robot, the start cannot be reached, or a joint leaves its range (with `strict`).
     SingularityError
-        If the path runs into a singular position (with `strict`): the joints that lose a motion are named.
+        If the path runs into a singular position (with `strict`); the message has the joints that lose a motion.
     TrajectoryError
-        If an instant is outside the path, or it has no derivative so high.
+        If an instant is outside the path, or the path has no derivative of this order.
 
     Examples
     --------
@@ -158,7 +159,7 @@ def follow_tool_path(
 def _start(
     robot: Robot, tool: Any, path: ToolPath, ranges: Any, laws: Any, start: Any, scale: Any, kinds: Any, link: str
 ) -> np.ndarray:
-    """Return coordinates with which the tool is at the beginning of the path."""
+    """Return coordinates of the tool at the beginning of the path."""
     n = len(robot.joint_names)
     lower, upper = (np.full(n, -np.inf), np.full(n, np.inf)) if ranges is None else (x.copy() for x in ranges)
     if laws:
@@ -182,7 +183,7 @@ def _start(
 
 
 def _to_posture(equations: PathEquations, u: np.ndarray, target: Any, begin: float, link: str) -> np.ndarray:
-    """Return the unknowns nearest to a posture, reached from given ones while the posture moves there from them."""
+    """Return the unknowns nearest to a posture, by continuation from given unknowns as the posture moves."""
     first = target(np.array([begin]), 0)
     own, posture = u[: equations.count], first["posture"][0, :, 0]
 

@@ -26,10 +26,10 @@ from jounce.robot.robot import Robot
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-STATIONARY = 1e-5  # of the slope that what is missed could have: less is none
+STATIONARY = 1e-5  # relative slope of the error at a stationary point
 WIDTHS = {"position": (3,), "rotation": (3, 3), "direction": (3,)}
-SOON = 16  # steps that reach most poses; the others take twice as many, and so on
-FINER = 1e-3  # of the tolerance: steps end below it
+SOON = 16  # steps that reach most poses; the others continue with twice as many, and so on
+FINER = 1e-3  # fraction of the tolerance at which steps end
 
 
 def inverse_kinematics(
@@ -50,8 +50,8 @@ def inverse_kinematics(
 ) -> JointPoses:
     """Return joint coordinates that bring a tool to poses, many at once.
 
-    Damped least squares (Levenberg-Marquardt, with the damping of Fan and Yuan 2005) within the limits of the joints,
-    with exact Jacobians. Poses that are not reached from the first start are tried from others.
+    The method is damped least squares (Levenberg-Marquardt, with the damping of Fan and Yuan 2005) within the limits of
+    the joints, with exact Jacobians. Poses not reached from the first start are tried from further starts.
 
     Parameters
     ----------
@@ -60,40 +60,41 @@ def inverse_kinematics(
     link : str
         The link that carries the tool.
     position : array_like of shape (..., 3), optional
-        Where `point` is to be, in the frame of the base, m; anywhere unless given.
+        Goal of `point` in the frame of the base, m; anywhere unless given.
     orientation : array_like of shape (..., 4) or (..., 3, 3), or scipy Rotation, optional
-        That of the link in the frame of the base: unit quaternions, scalar first, or rotation matrices.
+        Orientation of the link in the frame of the base: unit quaternions, scalar first, or rotation matrices.
     direction : array_like of shape (..., 3), optional
-        Where `axis` is to point, in the frame of the base, in the place of an orientation; turns about it are free.
+        Goal of the direction of `axis` in the frame of the base, instead of an orientation; rotations about it are
+        free.
     axis, point : array_like of shape (3,)
-        Of the tool, in the frame of the link; m.
+        Axis and point (m) of the tool in the frame of the link.
     start : array_like of shape (..., n), optional
-        Where to begin, rad or m; the middle of the ranges of the joints unless given.
+        Initial coordinates, rad or m; the middle of the ranges of the joints unless given.
     starts : int, default 8
-        How many starts are tried where the first fails, the others at random within the limits. Of several coordinates
-        found, those nearest to the first start count.
+        Number of starts if the first fails; further starts are random within the limits. Of several solutions, the
+        nearest to the first start counts.
     limits : bool, default True
-        Keep the limits of the joints, those of joints that follow others included.
+        Whether to keep the limits of the joints, including those of followers.
     tolerance : float, default 1e-10
-        Of what is missed, rad, or sizes of the robot.
+        Tolerance of the errors, in rad, or relative to the size of the robot.
     most_steps : int, default 200
-        From each start.
+        Limit on the steps from each start.
     seed : int, default 0
-        Of the other starts.
+        Seed of the random starts.
 
     Returns
     -------
     JointPoses
-        Coordinates with a status for each pose, and what is missed.
+        Coordinates with a status and errors for each pose.
 
     Raises
     ------
     RobotError
-        If an argument does not fit the robot, the tool has no goal, or both an orientation and a direction.
+        If an argument does not fit the robot, or the tool has no goal, or both an orientation and a direction.
 
     Notes
     -----
-    A redundant robot takes coordinates near those it starts from. Along a path, `follow_tool_path` keeps to one branch.
+    A redundant robot takes coordinates near the start. Along a path, `follow_tool_path` keeps to one branch.
 
     Examples
     --------
@@ -148,7 +149,7 @@ def poses_within(
     most_steps: int = 200,
     seed: int = 0,
 ) -> list[np.ndarray]:
-    """Return what `solve_poses` finds within ranges of the coordinates, from the first start or from others."""
+    """Return the results of `solve_poses` within ranges of the coordinates, from the first start or further starts."""
     lower, upper, scale = ranges
     constants = (tool, lower / scale, upper / scale, scale, np.float64(within * FINER))
 
@@ -156,7 +157,7 @@ def poses_within(
         targets = [x[chosen] for x in goal.values()]
         result = _marched(robot, begin, targets, constants, tuple(goal), min(most_steps, SOON))
         steps, slow = SOON, np.flatnonzero(result[3] > 0)
-        while slow.size and steps < most_steps:  # ever fewer go on by themselves
+        while slow.size and steps < most_steps:  # fewer and fewer poses continue
             left = min(steps, most_steps - steps)
             more = _marched(robot, result[0][slow], [x[slow] for x in targets], constants, tuple(goal), left)
             for whole, part in zip(result, more, strict=True):
@@ -215,7 +216,7 @@ def _result(
 
 
 def _away(robot: Robot, link: str, point: Any, q: Any, goal: Any, tool: Tool) -> tuple[Any, Any]:
-    """Return how far tools are from where they are to be, m, and by how much they are turned away, rad."""
+    """Return the position errors of tools, m, and their orientation errors, rad."""
     motion = forward_kinematics(robot, q[:, None], link, point)
     there, turned = np.asarray(motion.position)[:, 0], np.asarray(motion.rotation)[:, 0]
     distance = np.linalg.norm(there - goal["position"], axis=-1) if "position" in goal else np.zeros(len(q))
@@ -270,13 +271,13 @@ def joint_ranges(robot: AbstractRobot) -> tuple[Float[np.ndarray, " n"], Float[n
 
 
 def middle(lower: np.ndarray, upper: np.ndarray) -> Float[np.ndarray, " n"]:
-    """Return the middle of ranges; zero, or the end nearest to it, where one has no end."""
+    """Return the middle of ranges; for an unbounded range zero, or the end nearest to zero."""
     known = np.isfinite(lower) & np.isfinite(upper)
     ends = np.where(known, (lower, upper), 0.0)
     return np.where(known, 0.5 * ends[0] + 0.5 * ends[1], np.clip(0.0, lower, upper))
 
 
 def coordinate_scale(robot: AbstractRobot, tool: Tool) -> Float[np.ndarray, " n"]:
-    """Return what counts as one in each coordinate: 1 rad, or the size of the robot."""
+    """Return the unit of each coordinate: 1 rad, or the size of the robot."""
     turning = np.array([robot.joints[name].turning for name in robot.joint_names])
     return np.where(turning, 1.0, float(tool.length))

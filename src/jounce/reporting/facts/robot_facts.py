@@ -1,4 +1,4 @@
-"""What a robot file holds: links, joints with their limits, masses, loops and whether they close."""
+"""The contents of a robot file: links, joints with their limits, masses, and loops with their assembly."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from jounce.robot.closed_loops.closures import closure_wrenches
 
 
 class LinkFacts(TypedDict):
-    """A link: mass, and with which link it moves; kg, m, kg m^2."""
+    """A link: its mass properties (kg, m, kg m^2), and the link with which it moves."""
 
     name: str
     moves_with: str
@@ -26,7 +26,7 @@ class LinkFacts(TypedDict):
 
 
 class LimitFacts(TypedDict):
-    """Limits of a joint; None where there is none."""
+    """Limits of a joint; None is no limit."""
 
     lower: float | None
     upper: float | None
@@ -65,7 +65,7 @@ class JointFacts(TypedDict):
 
 
 class ClosureFacts(TypedDict):
-    """What closes a loop; the number of its independent and redundant equations is None where the loop cannot close."""
+    """The closure of a loop; the numbers of independent and redundant equations are None if the loop cannot close."""
 
     name: str
     type: str
@@ -75,7 +75,7 @@ class ClosureFacts(TypedDict):
 
 
 class FreedomFacts(TypedDict):
-    """Coordinates, and what the equations of loops leave of them; None where that is not known."""
+    """The coordinates, and the degrees of freedom left by the equations of loops; None if unknown."""
 
     coordinates: int
     equations: int
@@ -91,7 +91,7 @@ class LoopFacts(TypedDict):
 
 
 class RobotFacts(TypedDict):
-    """What a robot file holds."""
+    """The contents of a robot file."""
 
     kind: Literal["robot"]
     title: str
@@ -104,7 +104,10 @@ class RobotFacts(TypedDict):
 
 
 class OtherJoint(TypedDict):
-    """A joint of the file in the vectors of another program; factors of ours give its velocities, None if they vary."""
+    """A joint of the file in the vectors of another program; `factors` turn our velocities into those of the program.
+
+    They are None if they vary.
+    """
 
     joint: str
     coordinates: list[str]
@@ -118,7 +121,7 @@ class OtherJoint(TypedDict):
 
 
 class OtherReader(TypedDict):
-    """How another program numbers the coordinates: its velocities are ``factors * ours[indices]`` where these exist."""
+    """The coordinates in another program, whose velocities are ``factors * ours[indices]`` if these exist."""
 
     name: str
     version: str
@@ -131,7 +134,7 @@ class OtherReader(TypedDict):
 
 
 class InspectedRobot(RobotFacts):
-    """What a robot file holds, and how it starts; ``ok`` is whether its loops close."""
+    """The contents of a robot file, and its start; ``ok`` is whether the loops close."""
 
     file: str | None
     freedom: FreedomFacts
@@ -141,7 +144,7 @@ class InspectedRobot(RobotFacts):
 
 
 def robot_facts(robot: Robot) -> dict[str, Any]:
-    """Return the contents of a robot, before its loops are examined: RobotFacts.
+    """Return the contents of a robot, before an examination of its loops: RobotFacts.
 
     Parameters
     ----------
@@ -160,14 +163,14 @@ def robot_facts(robot: Robot) -> dict[str, Any]:
 
 
 def inspected_robot(robot: Robot, path: str | PathLike[str] | None = None) -> dict[str, Any]:
-    """Return what there is to know of a robot before it moves, as plain data in SI units: InspectedRobot.
+    """Return the facts of a robot before a motion, as plain data in SI units: InspectedRobot.
 
     Parameters
     ----------
     robot : Robot
-        One whose loops cannot be closed is reported too.
+        The robot; its loops may be impossible to close.
     path : optional
-        Its file.
+        File of the robot.
 
     Examples
     --------
@@ -198,12 +201,12 @@ def inspected_robot(robot: Robot, path: str | PathLike[str] | None = None) -> di
 
 
 def other_reader(reader: str, path: str | PathLike[str], robot: Robot) -> OtherReader:
-    """Return how another program numbers the coordinates of a robot file.
+    """Return the coordinates of a robot file in another program.
 
     Raises
     ------
     RobotError
-        No such program is known, or not for such a file.
+        If the program is unknown, or does not read such a file.
     """
     joints, position, velocity = as_read_by(reader, path, robot), 0, 0
     made: list[OtherJoint] = []

@@ -1,4 +1,4 @@
-"""Tables of facts of mechanisms, motions and robots: cells of text, whatever shows them."""
+"""Tables of facts of mechanisms, motions and robots as cells of text, for all outputs."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ class Table:
     Parameters
     ----------
     title : str
-        May be empty.
+        Title, which may be empty.
     headings : sequence of str
     rows : sequence of sequences of str
     numbers : sequence of int
-        Columns that are aligned to the right.
+        Columns aligned to the right.
     grouped : bool, default False
-        Whether rows with the same first cell, one below the other, belong together.
+        Whether consecutive rows with the same first cell form a group.
     marks : sequence of sequences of int
-        Columns of each row whose cells stand out; none where it is empty.
+        Columns of highlighted cells for each row; empty without highlights.
     markable : sequence of int
-        Columns in which marks can be.
+        Columns that may have highlighted cells.
     meaning : str
-        What a mark means.
+        Meaning of a highlight.
     """
 
     title: str
@@ -44,7 +44,7 @@ class Table:
 
 
 def table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> Table:
-    """Return a table without the columns that are empty throughout."""
+    """Return a table without its empty columns."""
     columns = [k for k in range(len(headings)) if any(row[k] for row in rows)] or [0]
     aligned = [k for k, column in enumerate(columns) if column in numbers]
     return Table(title, [headings[k] for k in columns], [[row[k] for k in columns] for row in rows], aligned)
@@ -68,7 +68,7 @@ def mechanism_tables(facts: Facts, bodies: Table) -> list[Table]:
 
 
 def bodies_table(facts: Facts) -> Table:
-    """Return the bodies of a mechanism that was inspected."""
+    """Return the bodies of an inspected mechanism."""
     angle = "angle" if facts["space"] == "planar" else "quaternion"
     rows = []
     for body in facts["bodies"]:
@@ -123,7 +123,7 @@ def _followed(mimic: Facts) -> str:
 
 
 def other_reader_table(facts: Facts) -> Table:
-    """Return the joints of a robot file as another program numbers them."""
+    """Return the joints of a robot file in the numbering of another program."""
     rows = []
     for joint in facts["joints"]:
         single = joint["positions"] == ["value"]
@@ -143,7 +143,7 @@ def other_reader_table(facts: Facts) -> Table:
 
 
 def span(first: int, parts: Sequence[str]) -> str:
-    """Return the numbers of the entries that parts have from a first one on."""
+    """Return the range of numbers of the parts, counted from a first number."""
     last = first + len(parts) - 1
     return "-" if not parts else str(first) if last == first else f"{first}..{last}"
 
@@ -154,9 +154,9 @@ def _count(closure: Facts, key: str) -> str:
 
 
 def peaks_table(given: Sequence[Peak]) -> Table:
-    """Return peak values with their times, unless they are constant; the largest magnitudes stand out."""
+    """Return peak values with their times, unless they are constant; the largest magnitudes are highlighted."""
     latest = max((abs(at) for p in given for at in (p.minimum_at, p.maximum_at) if math.isfinite(at)), default=1.0)
-    decimals = 3 - math.floor(math.log10(latest or 1.0))  # of times: a table is read, not computed with
+    decimals = 3 - math.floor(math.log10(latest or 1.0))  # of times: enough digits for a reader
     rows = []
     for peak in given:
         early, late = (x if float(f"{x:.3g}") == x else round(x, decimals) for x in (peak.minimum_at, peak.maximum_at))
@@ -170,7 +170,7 @@ def peaks_table(given: Sequence[Peak]) -> Table:
 
 
 def limits_table(report: LimitReport) -> Table:
-    """Return the worst instant of each joint and quantity that has a limit; broken limits stand out."""
+    """Return the worst instant of each joint and quantity with a limit; violated limits are highlighted."""
     rows = [
         [row.joint, row.quantity, row.unit, "infinite" if row.infinite else number(row.value), number(row.limit or 0.0),
          f"{row.ratio or 0.0:.4f}", f"{row.time:.5g}"]
@@ -182,12 +182,12 @@ def limits_table(report: LimitReport) -> Table:
 
 
 def number(value: float | None) -> str:
-    """Word a number that is read, not computed with; a dash where there is none."""
+    """Return the text of a number for readers, or a dash for a missing number."""
     return "-" if value is None or not math.isfinite(value) else f"{value:.6g}"
 
 
 def vector(values: Sequence[float] | None) -> str:
-    """Word the components of a vector."""
+    """Return the text of the components of a vector."""
     return "-" if values is None else ", ".join(f"{_rounded(x):.5g}" for x in values)
 
 

@@ -1,8 +1,8 @@
 """The mass matrix and the bias forces of a robot with their rates: ``tau = M q'' + bias``, on jets.
 
-Everything follows from the partial velocities of the bodies, what the rate of a joint does to each of them. The mass
-matrix is their products weighted by the masses, and the work along them is the force of a joint. Their own rates times
-the rates of the joints are the accelerations that remain where those of the joints are zero.
+Everything follows from the partial velocities of the bodies, their velocities for a joint rate of one. The mass matrix
+consists of their products, weighted by the masses; the work along them is the force of a joint. Their rates times the
+joint rates are the accelerations of the bodies for zero joint accelerations.
 """
 
 from collections.abc import Iterable, Sequence
@@ -27,7 +27,7 @@ from jounce.robot.recursions.tree_scan import BodySeries, Series, joint_coordina
 from jounce.robot.robot import Robot
 
 PARTS = ("coriolis", "centrifugal", "gravity")
-ABREAST = 8  # coordinates by which the mass matrix is differentiated side by side
+ABREAST = 8  # coordinates for which the mass matrix is differentiated together
 
 
 def centers_of(tree: Tree, frames: Frames) -> Jet:
@@ -36,7 +36,10 @@ def centers_of(tree: Tree, frames: Frames) -> Jet:
 
 
 def times_inertia(tree: Tree, frames: Frames, vector: Jet) -> Jet:
-    """Return the inertia tensors of the bodies about their centers times a vector of each, (3, ..., bodies, batch)."""
+    """Return the inertia tensors of the bodies about their centers times a vector of each body.
+
+    The shape is (3, ..., bodies, batch).
+    """
     between = (1,) * (len(vector.shape) - 3)
     frames = jax.tree.map(lambda c: jnp.reshape(c, (3, *between, *c.shape[1:])), frames)
     tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)
@@ -46,9 +49,9 @@ def times_inertia(tree: Tree, frames: Frames, vector: Jet) -> Jet:
 
 
 def partial_velocities(tree: Tree, frames: Frames) -> tuple[Jet, Jet]:
-    """Return the velocities of the centers of mass and the angular velocities that the rate of each joint causes.
+    """Return the velocities of the centers of mass and the angular velocities for a rate of one of each joint.
 
-    Both for a rate of one, of shape (3, joints, bodies, batch); zero for bodies that the joint does not move.
+    Both have the shape (3, joints, bodies, batch); they are zero for bodies that the joint does not move.
     """
     axis, origin = (jet.map(lambda c: c[:, :, None]) for jet in (frames.axes[2], frames.position))
     center = centers_of(tree, frames).map(lambda c: c[:, None])
@@ -59,16 +62,16 @@ def partial_velocities(tree: Tree, frames: Frames) -> tuple[Jet, Jet]:
 
 
 def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> BodySeries:
-    """Return the forces of the joints that do the work of forces on all bodies.
+    """Return the joint forces that do the work of forces on all bodies.
 
-    Forces at the centers of mass, and moments, are of shape (3, bodies, batch), in the axes of the base.
+    Forces at the centers of mass, and moments, have the shape (3, bodies, batch), in the axes of the base.
     """
     done = [dot(p, f.map(lambda c: c[:, None])) for p, f in zip(partial, (force, moment), strict=True) if f is not None]
     return stacked(total(done).map(lambda c: jnp.sum(c, axis=1)))
 
 
 def work_of_weight(tree: Tree, frames: Frames) -> BodySeries:
-    """Return the forces of the joints that hold the bodies against gravity."""
+    """Return the joint forces that hold the bodies against gravity."""
     weight = jnp.asarray(tree.gravity)[:, None, None] * jnp.asarray(tree.mass)[None, :, None]
     order = frames.position.order
     partial = partial_velocities(tree, frames)
@@ -76,15 +79,15 @@ def work_of_weight(tree: Tree, frames: Frames) -> BodySeries:
         return work(partial, Jet.constant(-weight, order))
     lift, moment = jnp.asarray(tree.lift)[:-1], jnp.asarray(tree.lift_moment)[:-1]
     down = jnp.broadcast_to(jnp.asarray(tree.gravity)[:, None, None], weight.shape)
-    off = moment - lift[:, None] * jnp.asarray(tree.center)  # of the mass that is lifted, about the center of all
+    off = moment - lift[:, None] * jnp.asarray(tree.center)  # moment of the lifted mass about the center of mass
     arm = frames.direction(jnp.swapaxes(off, 0, 1)[:, :, None])
     return work(partial, Jet.constant(lift[None, :, None] * down - weight, order), cross(arm, down))
 
 
 def work_of_motion(tree: Tree, q: Series, frames: Frames) -> Float[Numbers, "order-1 body batch"]:
-    """Return the forces of the joints that velocities alone need.
+    """Return the joint forces from velocities alone.
 
-    They are those of the inertia of bodies that move while the rates of the joints do not change.
+    They belong to the inertia of the bodies at constant joint rates.
     """
     partial = partial_velocities(tree, frames)
     rate = Jet(tuple(joint_coordinates(tree, q)[:, :, None])).differentiate()
@@ -98,8 +101,8 @@ def work_of_motion(tree: Tree, q: Series, frames: Frames) -> Float[Numbers, "ord
 def mass_jet(tree: Tree, q: Series) -> Float[jax.Array, "order coordinate coordinate batch"]:
     """Return the mass matrix as Taylor coefficients.
 
-    The element of two joints is the work, along the one nearer to the base, of the momentum of all that the other moves
-    at a rate of one (composite bodies: Featherstone 2008, Rigid Body Dynamics Algorithms, section 6.2).
+    The element of two joints is the work, along the joint nearer to the base, of the momentum of all bodies that the
+    other joint moves at a rate of one (composite bodies: Featherstone 2008, Rigid Body Dynamics Algorithms, 6.2).
     """
     frames = body_frames(tree, q).without_base()
     linear, angular = partial_velocities(tree, frames)
@@ -131,11 +134,11 @@ def centrifugal(tree: Tree, q: Series) -> Float[Numbers, "order-1 coordinate bat
     _, slope = jax.linearize(lambda q: mass_jet(tree, q), q)
 
     def by_coordinate(k: Any) -> Any:
-        """Return how the coordinate k changes its own column of the matrix, and the diagonal."""
+        """Return the derivatives of column k and of the diagonal of the matrix with respect to coordinate k."""
         change = slope(jnp.zeros_like(q).at[0, k].set(1.0))
         return change[:, :, k], jnp.einsum("ljjs->ljs", change)
 
-    # a few at a time: all slopes at once take the cube of the number of coordinates in memory, 4 GB for 150
+    # a few at a time: the memory for all derivatives at once is cubic in the number of coordinates, 4 GB for 150
     columns, diagonals = jax.lax.map(by_coordinate, jnp.arange(tree.shape.coordinates), batch_size=ABREAST)
     symbols = jnp.moveaxis(columns, 0, 2) - 0.5 * jnp.moveaxis(diagonals, 0, 1)  # levels, i, j, batch
     forces = Jet(tuple(symbols)) * (rate * rate)[None]
@@ -144,7 +147,7 @@ def centrifugal(tree: Tree, q: Series) -> Float[Numbers, "order-1 coordinate bat
 
 @Batched
 def mass_matrix_of_tree(tree: Tree, arrays: tuple[Series], _: Any, drives: bool) -> Any:
-    """Return the mass matrix, with what drives add to it, on Taylor coefficients."""
+    """Return the mass matrix, with the armature of drives, on Taylor coefficients."""
     matrix = mass_jet(tree, arrays[0])
     return matrix + armature_matrix(tree, Jet(tuple(arrays[0]))) if drives else matrix
 
@@ -169,7 +172,7 @@ def _bias(tree: Tree, arrays: tuple[Series], _: Any, parts: frozenset[str], driv
     forces = forces + stacked(passive_forces(tree, coordinates, rate, levels - 1))
     if not tree.shape.armed:
         return forces
-    still = Jet.constant(jnp.zeros(q.shape[1:]), levels - 1)  # turns of a ball that go on drag others along
+    still = Jet.constant(jnp.zeros(q.shape[1:]), levels - 1)  # constant rates of a ball still accelerate its drive
     return forces + stacked(inertial_forces(tree, coordinates, rate, still))
 
 
@@ -185,20 +188,20 @@ def mass_matrix(
     Parameters
     ----------
     robot : Robot
-        The robot, with what it holds (`Robot.with_payload`); one with closed loops has no independent coordinates.
+        The robot, with its payload (`Robot.with_payload`), without closed loops.
     q : array_like of shape (..., n)
-        Coordinates in the order of `robot.joint_names`, rad or m, as many positions as there are: unlike for
-        `inverse_dynamics`, derivatives must not stand among them, since nothing tells them from positions; give
-        ``q[..., 0, :]``. With `rates` of shape (..., order + 1, n): the coordinates and their derivatives.
+        Coordinates in the order of `robot.joint_names`, rad or m, for any number of positions. Unlike the argument of
+        `inverse_dynamics`, they must not include derivatives, which look like further positions; give
+        ``q[..., 0, :]``. With `rates`, of shape (..., order + 1, n): the coordinates and their derivatives.
     rates : bool, default False
-        Whether derivatives of the coordinates are given and those of the matrix are requested.
+        Whether `q` has derivatives and the result has rates of the matrix.
     drives : bool, default True
-        Add the armature inertia of the joints, as in `inverse_dynamics`.
+        Whether to add the armature inertia of the joints, as in `inverse_dynamics`.
 
     Returns
     -------
     array of shape (..., n, n), or (..., order + 1, n, n) with rates
-        kg m^2, kg m or kg, by s; symmetric. A joint that others follow bears their part.
+        Symmetric mass matrix, kg m^2, kg m or kg, by s. A joint includes the inertia of its followers.
 
     Raises
     ------
@@ -207,8 +210,8 @@ def mass_matrix(
 
     Notes
     -----
-    By composite bodies on jets (Featherstone 2008, Rigid Body Dynamics Algorithms, section 6.2); the matrix of the
-    kinetic energy ``1/2 q'^T M q'`` of Negrean 2025, equations 75-77.
+    The method is composite bodies on jets (Featherstone 2008, Rigid Body Dynamics Algorithms, section 6.2). The matrix
+    is that of the kinetic energy ``1/2 q'^T M q'`` of Negrean 2025, equations 75-77.
 
     Examples
     --------
@@ -231,40 +234,40 @@ def mass_matrix(
 def bias_forces(
     robot: Robot, q: ArrayLike, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool | None = None
 ) -> Array[Numbers, "*batch joint"]:
-    """Return the joint torques or forces that velocities and gravity need, and on request their rates.
+    """Return the joint torques or forces from velocities and gravity, and on request their rates.
 
-    What `inverse_dynamics` gives where all accelerations are zero: ``tau = M q'' + bias``, with `mass_matrix`.
+    They equal `inverse_dynamics` at zero accelerations: ``tau = M q'' + bias``, with `mass_matrix`.
 
     Parameters
     ----------
     robot : Robot
-        The robot, with what it holds (`Robot.with_payload`) and the gravity that it feels; one with closed loops has no
-        independent coordinates.
+        The robot, with its payload (`Robot.with_payload`) and its gravity, without closed loops.
     q : array_like of shape (..., 2, n)
-        Coordinates and velocities, in the order of `robot.joint_names`; derivatives beyond do not matter. With `rates`
+        Coordinates and velocities, in the order of `robot.joint_names`; higher derivatives have no effect. With `rates`
         of shape (..., order + 1, n), order 1 or more.
     rates : bool, default False
-        Whether rates of the forces are requested: each derivative beyond the velocities gives one.
+        Whether to return rates of the forces, one for each derivative above the velocities.
     parts : {"coriolis", "centrifugal", "gravity"} or a sequence of them, default all
-        What to add up. Centrifugal forces go with the squares of the velocities of single coordinates, Coriolis forces
-        with products of two; the split belongs to the choice of coordinates, and their sum is ``C(q, q') q'``.
+        Parts to add up. Centrifugal forces are proportional to squares of the velocities of single coordinates,
+        Coriolis forces to products of two; the split depends on the choice of coordinates, and the sum is
+        ``C(q, q') q'``.
     drives : bool, optional
-        Add viscous damping and Coulomb friction of the joints, as in `inverse_dynamics`. Unless given, they are added
-        to all parts together, and to no part alone.
+        Whether to add viscous damping and Coulomb friction of the joints, as in `inverse_dynamics`. By default they
+        are added to the sum of all parts only.
 
     Returns
     -------
     array of shape (..., n), or (..., order, n) with rates
-        N m, or N for prismatic joints, by s. A joint that others follow bears their part.
+        Torques, N m, or forces of prismatic joints, N, by s. A joint includes the forces of its followers.
 
     Raises
     ------
     RobotError
-        If q does not fit the robot, there is no such part, or the robot has closed loops.
+        If q does not fit the robot, a part does not exist, or the robot has closed loops.
 
     Notes
     -----
-    By the virtual work of inertia and weight: Negrean 2025, equations 81, 124 and 125.
+    The method is the virtual work of inertia and weight: Negrean 2025, equations 81, 124 and 125.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Jacobians with their rates, slopes of points, operational accelerations of any order. Negrean 2025, 50-59."""
+"""Jacobians with their rates, slopes of points, and operational accelerations of any order: Negrean 2025, 50-59."""
 
 import math
 from typing import Any
@@ -42,7 +42,7 @@ def _jacobian(tree: Tree, arrays: tuple[Series], frame: Frame) -> Any:
 def jacobian(
     robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0)
 ) -> Array[Numbers, "*batch derivative 6 joint"]:
-    """Return the Jacobian of a point of a link and its time derivatives, to any order.
+    """Return the Jacobian of a point of a link and its time derivatives to any order.
 
     Parameters
     ----------
@@ -58,13 +58,13 @@ def jacobian(
     Returns
     -------
     array of shape (..., order + 1, 6, n)
-        ``J, J', J'', ...``: three rows for the velocity of the point, three for the angular velocity, in the frame of
-        the base.
+        Jacobians ``J, J', J'', ...``: three rows for the velocity of the point, three for the angular velocity, in the
+        frame of the base.
 
     Raises
     ------
     RobotError
-        If there is no such link, or q does not fit the robot.
+        If the link does not exist, or q does not fit the robot.
 
     Examples
     --------
@@ -80,27 +80,27 @@ def jacobian(
 def point_slope(
     robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0), *, n: int = 1, m: int = 1
 ) -> Array[Numbers, "*batch 3 joint"]:
-    """Return ``dr^(n) / dq^(m)``: how the n-th derivative of a point changes with the m-th one of each coordinate.
+    """Return ``dr^(n) / dq^(m)``, the slope of the n-th derivative of a point by the m-th of each coordinate.
 
-    Negrean 2025, equations 50-55: ``C(n, m)`` times the rate of order n - m of the Jacobian of the point; where n is
-    less than m it is zero, and for n = m it is the same for all orders.
+    The slope is ``C(n, m)`` times the rate of order n - m of the Jacobian of the point (Negrean 2025, equations 50-55);
+    it is zero for n below m, and the same for all orders n = m.
 
     Parameters
     ----------
     robot, q, link, point
         As for `jacobian`, with q of order n - m or more.
     n, m : int, default 1
-        Orders of the derivatives of the point and of the coordinates, 0 or more; all other derivatives are held.
+        Orders of the derivatives of the point and of the coordinates, 0 or more; all other derivatives stay constant.
 
     Returns
     -------
     array of shape (..., 3, n)
-        In the frame of the base, m or m/rad, by s^(m - n).
+        Slopes in the frame of the base, m or m/rad, by s^(m - n).
 
     Raises
     ------
     RobotError
-        If there is no such link, an order is none, or q does not fit the robot or has too few derivatives.
+        If the link does not exist, an order is not valid, or q does not fit the robot or has too few derivatives.
 
     Examples
     --------
@@ -142,13 +142,13 @@ def operational_accelerations(
     Returns
     -------
     array of shape (..., order, 6)
-        ``X', X'', ..., X^(order)``: the velocity of the point and the angular velocity, then their derivatives, in the
-        frame of the base. Equal to the sum of ``C(m - 1, k) J^(k) q^(m - k)``.
+        Vectors ``X', X'', ..., X^(order)``: the velocity of the point and the angular velocity, then their derivatives,
+        in the frame of the base, equal to the sum of ``C(m - 1, k) J^(k) q^(m - k)``.
 
     Raises
     ------
     RobotError
-        If there is no such link, or q does not fit the robot.
+        If the link does not exist, or q does not fit the robot.
 
     Examples
     --------

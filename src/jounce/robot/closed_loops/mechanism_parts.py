@@ -1,4 +1,4 @@
-"""The bodies, joints, closures and drives that a robot becomes as a mechanism, in the frames of its moving links."""
+"""The bodies, joints, closures and drives of the mechanism of a robot, in the frames of its moving links."""
 
 from collections.abc import Container
 from typing import Any
@@ -32,7 +32,7 @@ DRIVES = ("armature", "damping", "friction", "stiffness")
 
 
 def on_body(robot: AbstractRobot, link: str) -> tuple[str, np.ndarray, np.ndarray]:
-    """Return the body that a link is part of, and the pose of the link in its frame."""
+    """Return the body of a link, and the pose of the link in the frame of the body."""
     index, position, rotation = robot.frames[link]
     if index < 0:
         return GROUND, position, rotation
@@ -57,9 +57,9 @@ class RobotParts:
     robot : Robot
         The robot.
     needed : set of str
-        Joints whose coordinates are requested, so that they are not merged into a free body or a ball.
+        Joints whose coordinates are requested, and which are therefore not merged into a free body or a ball.
     forces, outputs
-        What may name links that are otherwise merged.
+        Forces and outputs, which may name links that are otherwise merged.
     drives : bool
         Whether armature, damping, friction and springs of the joints are requested.
     """
@@ -77,14 +77,14 @@ class RobotParts:
         elements = [*(forces or {}).values(), *(x for x in (outputs or {}).values() if not isinstance(x, str))]
         links = {body for element in elements for body in element.bodies}
         links |= {on_body(robot, link)[0] for closure in robot.closures.values() for link in closure.links}
-        self.merged: dict[int, int] = {}  # by index of the last joint of a chain, how many joints are one
+        self.merged: dict[int, int] = {}  # number of merged joints, by the index of the last joint of a chain
         for k in range(len(self.moving)):
             for count in (6, 3):
                 first = k - count + 1
                 if first >= 0 and self._is_free(first, count, needed, links) and first not in self._inner():
                     self.merged[k] = count
                     break
-        self.rotors: dict[str, str] = {}  # what the bodies are called, by joint
+        self.rotors: dict[str, str] = {}  # names of the rotors, by joint
         for joint in self.driven:
             if joint.armature:
                 self.rotors[joint.name] = _unused(joint.name + ROTOR, {*robot.links, *self.rotors.values()})
@@ -109,7 +109,7 @@ class RobotParts:
         return {k for last, count in self.merged.items() for k in range(last - count + 1, last)}
 
     def _is_free(self, first: int, count: int, needed: set[str], links: set[str]) -> bool:
-        """Whether joints in a row let a body move freely (6), or turn freely (3), and nobody asks for one of them."""
+        """Whether consecutive joints let a body move freely (6), or turn freely (3), and none of them is requested."""
         robot, tree, chain = self.robot, self.tree, self.moving[first : first + count]
         following = {name for joint in self.moving if joint.mimic is not None for name in joint.mimic.weights}
         if any(joint.mimic is not None or joint.name in needed | following for joint in chain):
@@ -123,7 +123,7 @@ class RobotParts:
         if not all(tree.turning[turns]) or any(tree.turning[slides]) or np.abs(tree.position[turns[1:]]).max() > 1e-12:
             return False
         if any(abs(tree.rotation[k][2, 2]) > 1e-9 for k in turns[1:]):
-            return False  # neighbors not at right angles cannot turn a body every way
+            return False  # consecutive axes that are not perpendicular cannot reach all orientations
         if count == 3:
             return True
         axes = [np.eye(3)[2], tree.rotation[slides[1]] @ np.eye(3)[2]]
@@ -197,7 +197,7 @@ class RobotParts:
         return _unused(name, {*taken, *self.robot.joints, *self.robot.closures})
 
     def closure(self, closure: Closure, wrenches: np.ndarray) -> LinkClosure:
-        """Return what closes a loop, in the directions of the wrenches given in the frame of the first link."""
+        """Return the closure of a loop, along the directions of wrenches in the frame of the first link."""
         ends = [on_body(self.robot, link) for link in closure.links]
         points = [at + turned @ p for (_, at, turned), p in zip(ends, closure.points, strict=True)]
         (first, _, turned), (second, _, other) = ends
@@ -224,7 +224,7 @@ class RobotParts:
         return SlideOutput(at.bodies, at.point, np.zeros(3), at.axis_i)
 
     def losses(self) -> dict[str, AbstractForce]:
-        """Return the dampers and springs of the joints, their dry friction, and what bears weightless links."""
+        """Return the dampers and springs of the joints, their dry friction, and the forces that carry links."""
         forces_found: dict[str, AbstractForce] = self._lifts()
         for ball in self.balls:
             if ball.damping or ball.friction:
@@ -248,7 +248,7 @@ class RobotParts:
         return forces_found
 
     def _lifts(self) -> dict[str, AbstractForce]:
-        """Return the forces that bear links which feel less than all of gravity."""
+        """Return the forces that carry links with a share of gravity below one."""
         forces_found: dict[str, AbstractForce] = {}
         for name, link in self.robot.links.items():
             body, position, rotation = on_body(self.robot, name)
@@ -306,7 +306,7 @@ def _turned(angle: Any) -> dict[str, Any]:
 
 
 def friction_law(friction: Any) -> str:
-    """Return the law of Coulomb friction, which may differ by direction."""
+    """Return the law of Coulomb friction, which may depend on the direction."""
     forward, backward = np.broadcast_to(friction, 2).tolist()
     if forward == backward:
         return f"-{forward!r}*sign(v)"
@@ -314,12 +314,12 @@ def friction_law(friction: Any) -> str:
 
 
 def _check_couplings(robot: AbstractRobot) -> None:
-    """Refuse what is of several joints at once and that no force or inertia of a mechanism stands for.
+    """Check that a mechanism has forces and inertias for the couplings of several joints.
 
     Raises
     ------
     RobotError
-        A tendon has a spring, damping, friction or armature, or a ball with armature is carried by a link that turns.
+        If a tendon has a spring, damping, friction or armature, or a link that turns carries a ball with armature.
     """
     advice = "leave it out with drives=False, or take all that it has from the robot"
     for coupling in robot.couplings.values():

@@ -24,7 +24,7 @@ STANDARD_GRAVITY = 9.81  # m/s^2, as in Pinocchio and MuJoCo
 
 
 class AbstractRobot(Displayed, abc.ABC):
-    """Links and joints by name and the tree that they form: all of a robot but what is made of it; see `Robot`."""
+    """Links and joints by name and their tree, without the methods of `Robot`."""
 
     def __init__(
         self,
@@ -80,7 +80,7 @@ class AbstractRobot(Displayed, abc.ABC):
 
     @property
     def tree(self) -> Tree:
-        """The arrays that the algorithms on coordinates work with; a robot with closures has none."""
+        """Arrays for the algorithms on coordinates, for a robot without closures."""
         if self.closures:
             message = (
                 "the loops of this robot make its coordinates depend on one another; jn.solve(robot.mechanism(...)) "
@@ -91,7 +91,7 @@ class AbstractRobot(Displayed, abc.ABC):
 
     @property
     def link_names(self) -> tuple[str, ...]:
-        """Names of the links; each is also the name of a frame."""
+        """Names of the links, and of their frames."""
         return tuple(self.links)
 
     @property
@@ -101,47 +101,46 @@ class AbstractRobot(Displayed, abc.ABC):
 
     @property
     def moving_links(self) -> tuple[str, ...]:
-        """Names of the links that joints move, one for each, in the order of results for each body.
+        """Names of the links that joints move, one for each moving joint, in the order of results for each body.
 
-        Links fixed to one of them move with it, and their mass is counted there.
+        A moving link includes the links fixed to it, with their mass.
         """
         return tuple(joint.child for joint in self.moving_joints)
 
     @property
     def massless_joints(self) -> tuple[str, ...]:
-        """Joints that move no mass, so that no force is needed for any motion of them."""
+        """Joints that move no mass, so that their motion needs no force."""
         tree = self._tree
         if any(isinstance(link.inertia, TracedInertia) for link in self.links.values()):
-            return ()  # the masses are not known: forward dynamics tells where nothing resists a joint
+            return ()  # traced masses are unknown: forward dynamics reports joints without inertia
         moved = ((tree.mass > 0) | tree.inertia.any((1, 2))) @ tree.ancestors[:-1]
         return tuple(joint.name for joint, some in zip(self.moving_joints, moved, strict=True) if not some)
 
     @property
     def limits(self) -> dict[str, Limits]:
-        """Limits of the joints in `joint_names`, which keep those of joints that follow them too.
+        """Limits of the joints in `joint_names`, including the limits of their followers.
 
         Raises
         ------
         RobotError
-            If no coordinate, or but one, is within the range of a joint and of those that follow it.
+            If the ranges of a joint and its followers have no coordinate in common, or only one.
         """
         return self.limits_with({})
 
     def limits_with(self, given: Mapping[str, Limits]) -> dict[str, Limits]:
-        """Return the limits of the joints in `joint_names` with others in the place of their own.
+        """Return the limits of the joints in `joint_names`, with given limits in the place of their own.
 
-        Joints that follow others keep their own limits: of what is given to the joint that they follow and of these,
-        the tighter one holds.
+        Followers keep their own limits: the tighter of these and the given limits of the followed joint applies.
 
         Parameters
         ----------
         given : dict of str to Limits
-            Of some of the joints in `joint_names`.
+            Limits of some of the joints in `joint_names`.
 
         Raises
         ------
         RobotError
-            If no coordinate, or but one, is within the range of a joint and of those that follow it.
+            If the ranges of a joint and its followers have no coordinate in common, or only one.
 
         Examples
         --------
@@ -165,7 +164,7 @@ class AbstractRobot(Displayed, abc.ABC):
 
     @property
     def base_inertia(self) -> Inertia | None:
-        """Inertia of the base and of all links fixed to it, in the frame of the base; None if it has none."""
+        """Inertia of the base and of all links fixed to it, in the frame of the base; None without inertia."""
         fixed = {name: frame for name, frame in self.frames.items() if frame.body < 0}
         parts = [
             inertia.moved(frame.position, frame.rotation)
@@ -180,7 +179,7 @@ class AbstractRobot(Displayed, abc.ABC):
         return sum((link.inertia.mass for link in self.links.values() if link.inertia is not None), 0.0)
 
     def with_gravity(self: Made, gravity: ArrayLike) -> Made:
-        """Return the same robot under another acceleration of free fall, m/s^2 in the frame of the base."""
+        """Return the robot with another gravitational acceleration, m/s^2 in the frame of the base."""
         return self.changed(gravity=gravity)
 
     def with_closures(self: Made, closures: Sequence[Closure]) -> Made:
@@ -188,7 +187,7 @@ class AbstractRobot(Displayed, abc.ABC):
         return self.changed(closures=[*self.closures.values(), *closures])
 
     def opened(self: Made) -> Made:
-        """Return the tree without closures; its coordinates do not depend on one another."""
+        """Return the tree without closures, with independent coordinates."""
         return self.changed(closures=())
 
     def with_payload(self: Made, link: str, payload: Inertia) -> Made:
@@ -197,7 +196,7 @@ class AbstractRobot(Displayed, abc.ABC):
         Raises
         ------
         RobotError
-            If there is no such link.
+            If the link does not exist.
         """
         check_name("link", link, self.links, RobotError, name="link")
         inertia = self.links[link].inertia
@@ -213,27 +212,26 @@ class AbstractRobot(Displayed, abc.ABC):
         center_of_mass: ArrayLike | None = None,
         tensor: ArrayLike | None = None,
     ) -> Made:
-        """Return the robot with another inertia of a link; what is not given stays, zero where the link had none.
+        """Return the robot with another inertia of a link; omitted values stay, or are zero without an inertia.
 
-        JAX may trace the values, so that torques, accelerations and the mass matrix have gradients by them; they are
-        not checked then.
+        JAX may trace the values to differentiate torques, accelerations and the mass matrix; traced values are not
+        checked.
 
         Parameters
         ----------
         link : str
             Name of the link.
         mass : float, optional
-            kg.
+            Mass, kg.
         center_of_mass : array_like of shape (3,), optional
-            m, in the frame of the link.
+            Center of mass in the frame of the link, m.
         tensor : array_like of shape (3, 3) or (3,), optional
-            Inertia about the center of mass, in axes parallel to those of the link, kg m^2; three numbers are its
-            diagonal.
+            Inertia tensor about the center of mass, in axes parallel to those of the link, kg m^2, or its diagonal.
 
         Raises
         ------
         RobotError
-            If there is no such link, or a value is not one of a real body (unless the robot is not strict).
+            If the link does not exist, or no real body has these values (unless the robot is not strict).
 
         Examples
         --------
@@ -260,12 +258,12 @@ class AbstractRobot(Displayed, abc.ABC):
         return self.changed(links=list(links.values()))
 
     def locked(self: Made, positions: Mapping[str, float]) -> Made:
-        """Return the robot with joints held at given coordinates, rad or m; joints that follow them are held too.
+        """Return the robot with joints fixed at given coordinates, rad or m, together with their followers.
 
         Raises
         ------
         RobotError
-            If there is no such moving joint, or it follows another.
+            If the joint does not exist, is fixed, or follows another.
         """
         for name, value in positions.items():
             check_name("moving joint", name, self.joint_names, RobotError, name="locked")
@@ -286,18 +284,17 @@ class AbstractRobot(Displayed, abc.ABC):
         return self.changed(joints=joints, couplings=couplings)
 
     def with_floating_base(self: Made, sequence: str = "ZYX") -> Made:
-        """Return the robot on a base that moves freely: three slides along x, y, z, then three turns.
+        """Return the robot on a floating base: three translations along x, y, z, then three rotations.
 
-        The new base is the link ``world``, or ``world_`` where the robot has a link of that name. The coordinates
-        base_x, base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalized forces are those that
-        would have to hold the base: for one that is free, they tell how far a motion is from what physics allows. The
-        angles have a singular orientation (for ``ZYX`` the second at a right angle): choose a sequence that stays away
-        from it.
+        The new base is the link ``world``, or ``world_`` if the robot has a link of that name. The coordinates base_x,
+        base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalized forces are the forces that
+        would hold the base: for a free base, they show how far a motion violates the laws of motion. The angles have a
+        singular orientation (for ``ZYX`` the second angle at a right angle): choose a sequence that avoids it.
 
         Parameters
         ----------
         sequence : str, default "ZYX"
-            Axes of the turns, three letters, each about the axes as moved by those before.
+            Axes of the rotations, three letters, each about the axes as rotated by the preceding ones.
         """
         world = "world"
         while world in self.links:
@@ -307,7 +304,7 @@ class AbstractRobot(Displayed, abc.ABC):
 
     @abc.abstractmethod
     def mechanism(self, q: Any = None, **settings: Any) -> Any:
-        """Return the mechanism that the robot is."""
+        """Return the mechanism of the robot."""
 
     def coordinates(self, **values: float) -> np.ndarray:
         """Return an array for q, shape (n,), with the named joints at the given values and the others at zero."""
@@ -322,7 +319,7 @@ class AbstractRobot(Displayed, abc.ABC):
         return type(self)(**{"name": self.name, "gravity": self.gravity, "strict": self.strict, **current, **parts})
 
     def _checked_closure(self, closure: Closure) -> Closure:
-        """Return a closure with what it leaves to the pose at coordinates zero."""
+        """Return a closure with missing values from the pose at coordinates zero."""
         where = f"closures.{closure.name}"
         if closure.name in self.joints:
             raise RobotError("a joint and a closure have the same name", name=where)
@@ -374,7 +371,7 @@ def _poses_at_zero(joints: Mapping[str, Joint]) -> dict[str, tuple[np.ndarray, n
 
 
 def _fixed_at(joint: Joint, coordinate: float) -> Joint:
-    """Return the fixed joint that holds a moving one at a coordinate."""
+    """Return the fixed joint that holds a moving joint at a coordinate."""
     position, rotation = joint.position, joint.rotation
     if joint.turning:
         rotation = rotation @ turn_about(joint.axis, coordinate)

@@ -1,4 +1,4 @@
-"""What a robot is made of: links, joints and limits, as a file or a script gives them; frozen and checked."""
+"""The links, joints and limits of a robot, as given by a file or a script, frozen and checked."""
 
 import dataclasses
 import math
@@ -18,21 +18,21 @@ TYPES = (*MOVING, "fixed")
 
 @dataclasses.dataclass(frozen=True)
 class Limits:
-    """What a joint may do; None is no limit. Angles in rad, lengths in m, torques in N m, forces in N.
+    """Limits of a joint; None is no limit. Angles are in rad, lengths in m, torques in N m, forces in N.
 
     Parameters
     ----------
     lower, upper : float or None
         Range of the coordinate, rad or m.
     velocity, acceleration, jerk : float or None
-        Largest absolute values of its derivatives.
+        Largest absolute values of the derivatives of the coordinate.
     effort : float or None
         Largest torque or force.
     effort_rate : float or None
         Largest rate of the torque or force.
     deceleration : float or None
-        Largest absolute value of the acceleration while it slows the joint down, where it has the sign opposite to the
-        velocity; `acceleration` holds there too unless this is given.
+        Largest absolute value of an acceleration that slows the joint down, with the sign opposite to the velocity;
+        `acceleration` unless given.
 
     Examples
     --------
@@ -77,14 +77,14 @@ class Link:
     name : str
         Name of the link, and of its frame.
     inertia : Inertia or None
-        In the frame of the link.
+        Inertia in the frame of the link.
     gravity : float, default 1
-        Share of gravity that the link feels: 0 where that is switched off, or held by something else.
+        Share of gravity that acts on the link: 0 if gravity is switched off or balanced.
 
     Raises
     ------
     RobotError
-        If the inertia is none, or the share is not finite.
+        If the inertia is not an `Inertia`, or the share is not finite.
 
     Examples
     --------
@@ -111,38 +111,38 @@ class Joint:
     name : str
         Name of the joint.
     parent, child : str
-        Names of the links that it joins.
+        Names of the two links.
     type : {"revolute", "continuous", "prismatic", "fixed"}, default "revolute"
         A revolute or continuous joint turns about its axis, a prismatic one slides along it.
     position : array_like of shape (3,), default zero
         Origin of the child link at coordinate zero, in the frame of the parent link, m.
     rotation : array_like of shape (3, 3), default identity
-        Takes components in the frame of the child link, at coordinate zero, to that of the parent.
+        Rotation matrix from the frame of the child link, at coordinate zero, to the frame of the parent link.
     axis : array_like of shape (3,), default z
-        Axis in the frame of the child link; it is normalized.
+        Axis in the frame of the child link, of any length.
     limits : Limits, optional
-        What the joint may do.
+        Limits of the joint.
     mimic : Mimic, optional
         What this joint follows.
     armature : float, default 0
-        Inertia of the drive, seen at the joint, kg m^2 or kg. Of a joint that follows another, this and the next two
-        count through the multiplier.
+        Inertia of the drive at the joint, kg m^2 or kg. The armature, damping and friction of a follower act on the
+        followed joint through the multiplier.
     damping : float, default 0
         Viscous friction, N m s/rad or N s/m.
     friction : float or sequence of two floats, default 0
-        Coulomb friction, N m or N; of two, against positive velocities and against negative ones.
+        Coulomb friction, N m or N, or a pair for positive and for negative velocities.
     stiffness : float, default 0
-        Of a spring that holds the joint, N m/rad or N/m.
+        Stiffness of a spring at the joint, N m/rad or N/m.
     spring_reference : float, default 0
         Coordinate at which the spring is free, rad or m.
     start : float, default 0
-        Coordinate from which loops are closed and equilibria looked for, unless another is given, rad or m.
+        Default initial coordinate for closing loops and for equilibria, rad or m.
 
     Raises
     ------
     RobotError
-        If the type is not known, a value is not finite or has another shape, the axis has no length, the rotation is
-        none, or armature, damping, friction or stiffness is negative.
+        If the type is unknown, a value is not finite or has a wrong shape, the axis has no length, the rotation is not
+        a rotation matrix, or armature, damping, friction or stiffness is negative.
 
     Examples
     --------
@@ -196,7 +196,7 @@ class Joint:
 
     @property
     def moving(self) -> bool:
-        """Whether the joint lets its links move."""
+        """Whether the joint allows a motion of its links."""
         return self.type != "fixed"
 
     @property
@@ -206,7 +206,7 @@ class Joint:
 
 
 def ranges_at_leader(limits: Limits, followers: Iterable[Joint]) -> list[tuple[float, float]]:
-    """Return the range of a joint, and those of the joints that follow it as they bind it; infinite where none is."""
+    """Return the range of a joint, and those of its followers as ranges of the joint; infinite without limits."""
     ranges = []
     every = [(limits, Mimic("")), *((x.limits, x.mimic) for x in followers if x.mimic and x.mimic.multiplier)]
     for own, mimic in every:
@@ -217,7 +217,7 @@ def ranges_at_leader(limits: Limits, followers: Iterable[Joint]) -> list[tuple[f
 
 
 def common_range(ranges: Iterable[tuple[float, float]]) -> tuple[float, float]:
-    """Return what ranges have in common; its ends are exchanged where that is nothing."""
+    """Return the intersection of ranges; the lower end exceeds the upper end if it is empty."""
     lower, upper = zip(*ranges, strict=True)
     return max(lower), min(upper)
 
@@ -235,15 +235,15 @@ def has_room(limits: Limits, followers: Iterable[Joint]) -> bool:
 
 
 def limits_with_followers(name: str, limits: Limits, followers: Iterable[Joint]) -> Limits:
-    """Return limits of a joint that keep those of the joints that follow it too.
+    """Return limits of a joint that include those of its followers.
 
-    A follower moves as the joint does, times its multiplier. Its torque is borne by what drives the joint, and has no
-    limit of its own.
+    A follower moves as the joint does, times its multiplier. The drive of the joint provides the torque of the
+    follower, which has no limit of its own.
 
     Raises
     ------
     RobotError
-        If no coordinate, or but one, is within all ranges.
+        If the ranges have no coordinate in common, or only one.
     """
     followers = list(followers)
     every = [(limits, Mimic(name))]
@@ -252,7 +252,7 @@ def limits_with_followers(name: str, limits: Limits, followers: Iterable[Joint])
         return limits
 
     def least(*fields: str) -> float | None:
-        """Return the least of the limits, of each joint that of the first field that it has."""
+        """Return the smallest limit, with the first available field of each joint."""
         given = [(next((x for f in fields if (x := getattr(own, f)) is not None), None), mimic) for own, mimic in every]
         return min((x / abs(mimic.multiplier) for x, mimic in given if x is not None), default=None)
 
@@ -279,30 +279,30 @@ CLOSURES = ("connect", "weld", "pin", "slider")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Closure:
-    """What closes a loop: two links that are held together besides the joints of the tree.
+    """The closure of a loop: a connection of two links in addition to the joints of the tree.
 
     Parameters
     ----------
     name : str
-        Name of the closure, which no joint has.
+        Name of the closure, different from names of joints.
     links : sequence of str
         Names of the two links.
     type : {"connect", "weld", "pin", "slider"}, default "connect"
-        What stays as it is: a point of each link in one place (3 equations), or the whole pose (6); a pin leaves a turn
-        about an axis (5), a slider a travel along it (5).
+        Constraint between the links: a common point (connect, 3 equations), or a constant relative pose (weld, 6); a
+        pin allows a rotation about an axis (5), a slider a translation along it (5).
     points : array_like of shape (3,) or (2, 3), default zero
-        The point in the frame of the first link, m, and the one in that of the second; without this, it is where the
-        first one is at coordinates zero.
+        Points in the frames of the first and of the second link, m. Unless given, the second point coincides with the
+        first at coordinates zero.
     axis : array_like of shape (3,), optional
-        Of a pin or a slider, in the frame of the first link.
+        Axis of a pin or a slider, in the frame of the first link.
     rotation : array_like of shape (3, 3), optional
-        Takes components in the frame of the second link to that of the first where the loop is closed; for a pin but
-        for turns about its axis. Without it, as at coordinates zero.
+        Rotation matrix from the frame of the second link to the frame of the first in a closed loop; for a pin, up to
+        rotations about its axis. By default the rotation at coordinates zero.
 
     Raises
     ------
     RobotError
-        If the type is not known, the links are not two, a value is not finite or has another shape, or the axis of a
+        If the type is unknown, there are not two links, a value is not finite or has a wrong shape, or the axis of a
         pin or a slider is missing.
 
     Examples
@@ -338,12 +338,12 @@ class Closure:
 
 
 def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:
-    """Return a rotation matrix, checked.
+    """Return a checked rotation matrix.
 
     Raises
     ------
     RobotError
-        If it is none.
+        If the value is not a rotation matrix.
     """
     matrix = vector_numbers(name, value, (3, 3))
     if not np.allclose(matrix @ matrix.T, np.eye(3), rtol=0, atol=1e-6) or np.linalg.det(matrix) < 0:

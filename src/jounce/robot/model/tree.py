@@ -1,4 +1,4 @@
-"""The robot as the algorithms see it: moving bodies in depth-first order, as arrays that are scanned."""
+"""The arrays of a robot for its algorithms: moving bodies in depth-first order, to be scanned."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -22,20 +22,21 @@ FORWARD_BACKWARD = np.array([[0.5, 0.5], [0.5, -0.5]])  # mean and half of the d
 
 @dataclasses.dataclass(frozen=True)
 class Shape:
-    """What is known when the algorithms are compiled: how many bodies there are and what kinds of joints.
+    """The numbers and kinds of bodies and joints, known when the algorithms are compiled.
 
     Parameters
     ----------
     bodies, coordinates, slots : int
-        Moving bodies; coordinates in q; places in which states of parents are kept until their last child is done.
+        Numbers of moving bodies, of coordinates in q, and of places for states of parents until their last child is
+        done.
     turning, sliding : bool
         Whether any joint turns, or slides.
     direct : bool
-        Whether body k has coordinate k for its own, as where no joint follows another.
+        Whether body k has coordinate k for its own, as in a robot without followers.
     tendons, balls : int
-        Springs and tendons; balls with drives.
+        Numbers of springs and tendons, and of balls with drives.
     armed, lifted : bool
-        Whether drives of balls, or tendons, have armature; whether some bodies feel less than all of gravity.
+        Whether drives of balls, or tendons, have armature; whether a body has a share of gravity below one.
     rubbing : bool
         Whether a joint, a tendon or the drive of a ball has Coulomb friction.
     """
@@ -56,7 +57,7 @@ class Shape:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Tendons:
-    """Springs of joints, and tendons along them: lengths that are weighted sums of coordinates.
+    """Springs of joints, and tendons along joints, whose lengths are weighted sums of coordinates.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ class Balls:
     Parameters
     ----------
     select : array of shape (3, balls, coordinates)
-        1 where a coordinate is the first, second or third turn of a ball.
+        1 if a coordinate is the first, second or third rotation of a ball.
     armature, damping, friction : array of shape (balls,)
     """
 
@@ -93,37 +94,37 @@ class Balls:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Tree:
-    """Arrays of a robot, one entry for each moving body; its frame has the axis of its joint for z.
+    """Arrays of a robot, one entry for each moving body, in whose frame z is the axis of the joint.
 
-    Links fixed to a moving one are part of its body. Bodies are in depth-first order.
+    Links fixed to a moving link are part of its body. Bodies are in depth-first order.
 
     Parameters
     ----------
     rotation, position : array of shape (bodies, 3, 3) and (bodies, 3)
         Pose of the body at coordinate zero in the frame of its parent body.
     mass, center, inertia : array of shape (bodies,), (bodies, 3), (bodies, 3, 3)
-        Mass, center of mass and inertia about it, in the frame of the body.
+        Mass, center of mass and inertia about the center of mass, in the frame of the body.
     turning : array of shape (bodies,)
-        1 where the joint turns, 0 where it slides.
+        1 for a joint that turns, 0 for a joint that slides.
     coordinate, multiplier : array of shape (leaders, bodies)
-        The coordinate of the joint is ``offset`` and the sum of ``multiplier * q[coordinate]``, over as many leaders as
-        any joint follows.
+        The coordinate of a joint is ``offset`` plus the sum of ``multiplier * q[coordinate]`` over its leaders, padded
+        with zeros to the largest number of leaders.
     offset : array of shape (bodies,)
     slot, parent_slot : array of int, shape (bodies,)
-        Where the state of the body is kept, and where that of its parent is.
+        Places of the state of the body and of its parent.
     ancestors : array of shape (bodies + 1, bodies)
-        1 where joint j moves body i; the last row is the base.
+        1 if joint j moves body i; the last row is the base.
     armature, damping, friction : array of shape (coordinates,)
-        Of the drives, those of joints that follow included.
+        Values of the drives, including those of followers.
     friction_skew : array of shape (coordinates,)
-        By how much friction against positive rates exceeds the mean of both directions.
+        Friction against positive rates minus the mean of both directions.
     tendons : Tendons
     balls : Balls
     lift, lift_moment : array of shape (bodies + 1,) and (bodies + 1, 3)
-        Mass that gravity does not pull at, and its first moment about the origin, in the frame of the body; the last is
-        the base.
+        Mass without gravity, and its first moment about the origin, in the frame of the body; the last entry is the
+        base.
     gravity : array of shape (3,)
-        m/s^2.
+        Gravitational acceleration, m/s^2.
     """
 
     rotation: Any
@@ -151,7 +152,7 @@ class Tree:
 
 
 class Frame(NamedTuple):
-    """Where a link is: the body that it moves with (-1 is the base), and its pose in the frame of that body."""
+    """The frame of a link: the body of the link (-1 is the base), and the pose in the frame of the body."""
 
     body: int
     position: Float[np.ndarray, " 3"]
@@ -203,9 +204,9 @@ def arrange(
     gravity: np.ndarray,
     couplings: Sequence[Coupling] = (),
 ) -> tuple[Tree, dict[str, Frame]]:
-    """Merge fixed links, turn the axes of all joints to z, and lay the bodies out for the scans.
+    """Merge fixed links, turn the axes of all joints to z, and arrange the bodies for scans.
 
-    Joints are in order, those of parents first.
+    The joints are in order, parents first.
     """
     identity, zero = np.eye(3), np.zeros(3)
     frames = {base: Frame(-1, zero, identity)}
@@ -281,7 +282,7 @@ def arrange(
 
 
 def _leaders(mimics: Sequence[Mimic], order: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Return which coordinates joints follow, and by how much: the first one again, by zero, where there are fewer."""
+    """Return the coordinates that joints follow, and their multipliers, padded with the first one and zeros."""
     count = max((len(mimic.weights) for mimic in mimics), default=1)
     coordinate, multiplier = np.zeros((count, len(mimics)), int), np.zeros((count, len(mimics)))
     for body, mimic in enumerate(mimics):
@@ -293,7 +294,7 @@ def _leaders(mimics: Sequence[Mimic], order: Sequence[str]) -> tuple[np.ndarray,
 
 
 def _lift(lifted: dict[int, list[tuple[Any, Any]]], frame: Frame, link: Link) -> None:
-    """Note mass and first moment of a link, in its body, as far as gravity does not pull at it."""
+    """Record the mass of a link without gravity, and its first moment, for its body."""
     if link.inertia is None or link.gravity == 1:
         return
     inertia = link.inertia.moved(frame.position, frame.rotation)
@@ -337,12 +338,12 @@ def _balls(order: Sequence[str], couplings: Sequence[Coupling]) -> Balls:
 
 
 def _array(parts: list[Any]) -> Any:
-    """Return parts as one array, of JAX where it traces some of them."""
+    """Return parts as one array, a JAX array if JAX traces one of them."""
     return jnp.stack(parts) if any(isinstance(part, Tracer) for part in parts) else np.array(parts)
 
 
 def axes_with_z_along(axis: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
-    """Return a rotation matrix whose third column is the given unit vector; exact for the axes of a frame."""
+    """Return a rotation matrix with a unit vector as third column, exact for the axes of a frame."""
     third = int(np.argmax(np.abs(axis)))
     first = np.eye(3)[(third + 1) % 3]
     first = first - (first @ axis) * axis
@@ -365,7 +366,7 @@ def quaternion_matrix(quaternion: Float[np.ndarray, " 4"]) -> Float[np.ndarray, 
 
 
 def _slots(parents: list[int]) -> tuple[list[int], list[int], int]:
-    """Give each body a place for its state, taken over from its parent by the last child, so that few are needed."""
+    """Return the places of the states of bodies and of their parents; a last child reuses the place of its parent."""
     last = {parent: k for k, parent in enumerate(parents)}
     slots, free, count = {-1: 0}, [], 1
     for k, parent in enumerate(parents):

@@ -1,7 +1,7 @@
-"""The equations of motion of a tree, written once on plain values: what its joints need for given accelerations.
+"""The equations of motion of a tree on plain values: the joint forces for given accelerations.
 
-Vectors are in the axes of the base of the scene, and belong to the origins of the bodies. `jet.programs.series` runs
-this program order after order, and all that is not a sum along branches is done for all bodies side by side.
+Vectors are in the axes of the base of the scene, and refer to the origins of the bodies. `jet.programs.series` runs
+this program order after order; all operations except sums along branches cover all bodies together.
 """
 
 import dataclasses
@@ -34,22 +34,22 @@ from jounce.robot.recursions.tree_sums import sums_at_parents, totals
 
 Coordinates = Float[Numbers, "coordinate batch"]
 Wrenches = tuple[Float[Numbers, "6 batch"], ...]
-"""Force and torque of each wrench from outside."""
+"""Force and torque of each external wrench."""
 
 
 class FreeBase(NamedTuple):
-    """Where a free base is and how it moves.
+    """The pose and twist of a free base.
 
     Attributes
     ----------
     position : array of shape (3, batch)
-        Of its origin, m.
+        Position of the origin, m.
     quaternion : array of shape (4, batch)
-        Of unit length, scalar first.
+        Unit quaternion, scalar first.
     axes : array of shape (3, 3, batch)
-        Its rotation matrix.
+        Rotation matrix.
     twist : array of shape (6, batch)
-        Velocity of its origin and angular velocity, in its own axes, m/s and rad/s.
+        Velocity of the origin and angular velocity, in the axes of the base, m/s and rad/s.
     """
 
     position: Numbers
@@ -59,16 +59,16 @@ class FreeBase(NamedTuple):
 
 
 class TreeState(NamedTuple):
-    """Where a tree is and how it moves.
+    """The position and velocity of a tree.
 
     Attributes
     ----------
     coordinates, rates : array of shape (coordinates, batch)
-        rad or m, and by s.
+        Coordinates and their rates, rad or m, and by s.
     axes : array of shape (3, 3, bodies, batch)
         Rotation matrices of the bodies.
     arm : array of shape (3, bodies, batch)
-        From the origin of the parent of each body to its own, m.
+        Vector from the origin of the parent of each body to that of the body, m.
     base : FreeBase or None
     """
 
@@ -80,7 +80,7 @@ class TreeState(NamedTuple):
 
 
 class Unknowns(NamedTuple):
-    """Accelerations: of the coordinates, and the rates of the components of the twist of a free base; or forces."""
+    """Accelerations of the coordinates and rates of the components of the twist of a free base, or forces."""
 
     joints: Float[Numbers, "coordinate batch"]
     base: Float[Numbers, "6 batch"] | None
@@ -89,7 +89,7 @@ class Unknowns(NamedTuple):
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class BaseBody:
-    """Mass, center of mass and inertia about it of a free base, in its axes."""
+    """The mass of a free base, its center of mass, and its inertia about that center, in the axes of the base."""
 
     mass: Any
     center: Any
@@ -104,15 +104,15 @@ class TreeEquations(Module):
     tree : Tree
         Arrays of the robot.
     driven : array of shape (coordinates,)
-        1 where the acceleration is given in the place of a force, else 0.
+        1 for a given acceleration, 0 for a given force.
     base : BaseBody, optional
-        Of a base that moves freely.
+        Mass properties of a free base.
     frames : tuple of Frame
-        Where wrenches from outside act, and in which axes of the body they are given.
+        Frames at which external wrenches act, with the axes of their components.
     global_axes : tuple of bool
-        Whether they are in the axes of the scene.
+        Whether the components of wrenches are in the axes of the scene.
     drives : bool
-        Whether drives count, with armature, damping and friction.
+        Whether to include armature, damping and friction of drives.
     """
 
     tree: Tree
@@ -124,7 +124,7 @@ class TreeEquations(Module):
 
     @by_certain_entries()
     def motion(self, coordinates: Coordinates, rates: Coordinates, base: FreeBase | None = None) -> TreeState:
-        """Return where all bodies are, from the coordinates."""
+        """Return the state of all bodies from coordinates and rates."""
         tree, lanes = self.tree, coordinates.shape[-1]
         joints = at_joints(tree, coordinates) + (0.0 if tree.shape.direct else jnp.asarray(tree.offset)[:, None])
         turn = Turn.of(tree, Jet([joints[:, None]]))
@@ -145,7 +145,7 @@ class TreeEquations(Module):
 
     @by_certain_entries()
     def factored(self, motion: TreeState) -> "TreeFactor":
-        """Return what gives accelerations for forces, at this position; made once for all orders."""
+        """Return the factored inertia at a position, which gives accelerations for forces, for all orders."""
         tree = self.tree
         armature = jnp.asarray(tree.armature) if self.drives else jnp.zeros(tree.shape.coordinates)
         free = 1.0 - jnp.asarray(self.driven)
@@ -175,7 +175,7 @@ class TreeEquations(Module):
 
     @by_certain_entries()
     def needed(self, motion: TreeState, unknowns: Unknowns, wrenches: Wrenches = ()) -> Unknowns:
-        """Return the forces that accelerations need: of the coordinates, and on a free base, in its axes."""
+        """Return the forces for accelerations: of the coordinates, and on a free base, in its axes."""
         tree, lanes, base = self.tree, motion.axes.shape[-1], motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
         z, arm = motion.axes[:, 2], motion.arm
@@ -222,7 +222,7 @@ class TreeEquations(Module):
 
     @by_certain_entries()
     def motion_rates(self, motion: TreeState, unknowns: Unknowns) -> TreeState:
-        """Return how all that a motion consists of changes."""
+        """Return the rates of all parts of a state."""
         tree, base = self.tree, motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
         z, rates = motion.axes[:, 2], at_joints(tree, motion.rates)[None]
@@ -241,7 +241,7 @@ class TreeEquations(Module):
         return TreeState(motion.rates, unknowns.joints, axes, arm, moved)
 
     def energy(self, motion: TreeState) -> tuple[Float[Numbers, " batch"], Float[Numbers, " batch"]]:
-        """Return kinetic energy, that of armatures included, and potential energy in gravity and springs, J."""
+        """Return the kinetic energy, with that of armatures, and the potential energy of gravity and springs, J."""
         tree, base = self.tree, motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
         place0 = spin0 = velocity0 = jnp.zeros((3, motion.axes.shape[-1]))
@@ -278,7 +278,7 @@ class TreeEquations(Module):
         return kinetic, potential
 
     def _pushed(self, motion: TreeState, wrenches: Wrenches) -> Any:
-        """Return forces and moments from outside, what bears weight among them, on the bodies and, last, the base."""
+        """Return external forces and moments, with those that balance gravity, on the bodies and, last, the base."""
         tree = self.tree
         if not wrenches and not tree.shape.lifted:
             return None
@@ -300,7 +300,7 @@ class TreeEquations(Module):
 
 
 class TreeFactor(Module):
-    """The factored inertia of a tree: by articulated bodies, or as a dense matrix where joints follow others."""
+    """The factored inertia of a tree: by articulated bodies, or as a dense matrix if joints are coupled."""
 
     bodies: ArticulatedBodies | None
     dense: tuple[DenseFactor, Any] | None
@@ -309,7 +309,7 @@ class TreeFactor(Module):
 
     @property
     def margin(self) -> Float[Numbers, "joint batch"]:
-        """How far each joint, then a free base, or the whole, is from what nothing resists; see `ArticulatedBodies`."""
+        """Margin of each joint and of a free base, or of the whole, to a singular inertia; see `ArticulatedBodies`."""
         if self.bodies is None:
             assert self.dense is not None
             return self.dense[0].pivot_ratio()[None]
@@ -319,7 +319,7 @@ class TreeFactor(Module):
 
     @by_certain_entries()
     def solve(self, missing: Unknowns) -> Unknowns:
-        """Return the accelerations that bring up forces which are missing; none of joints that are driven."""
+        """Return the accelerations from missing forces, zero for driven joints."""
         if self.bodies is None:
             assert self.dense is not None
             (factor, scale), count = self.dense, len(self.free)
@@ -336,7 +336,7 @@ class TreeFactor(Module):
 
 
 def _with_base(values: Any, field: str, base: FreeBase | None) -> Any:
-    """Return axes or positions of the bodies and, last, of the base, whose frame is the scene unless it is free."""
+    """Return axes or positions of the bodies and, last, of the base, which is the scene unless free."""
     if base is not None:
         last = getattr(base, field)
     else:
@@ -346,7 +346,7 @@ def _with_base(values: Any, field: str, base: FreeBase | None) -> Any:
 
 
 def free_base(position: Any, quaternion: Any, twist: Any) -> FreeBase:
-    """Return a free base from its pose, of a quaternion of unit length, and its twist."""
+    """Return a free base from its position, unit quaternion and twist."""
     return FreeBase(position, quaternion, jnp.stack(body_axes(quaternion), axis=1), twist)
 
 
@@ -360,7 +360,7 @@ def _local(axes: Any, vector: Any) -> Any:
 
 
 def _columns(values: tuple[Any, Any, Any], many: bool) -> tuple[Any, Any, Any]:
-    """Return mass, center and tensor with components first and a batch of one last."""
+    """Return mass, center and tensor with components first and a batch of size one last."""
     mass, center, tensor = map(jnp.asarray, values)
     if many:
         return mass[None, :, None], jnp.moveaxis(center, 0, -1)[..., None], jnp.moveaxis(tensor, 0, -1)[..., None]
@@ -375,7 +375,7 @@ def _turned_inertia(axes: Any, mass: Any, center: Any, tensor: Any) -> RigidIner
 
 
 def _energies(axes: Any, values: tuple[Any, ...], spin: Any, velocity: Any, position: Any, gravity: Any) -> list[Any]:
-    """Return the kinetic energy of bodies, or of one, and the potential energy, summed."""
+    """Return the total kinetic and potential energies of bodies, or of one body."""
     mass, center, tensor = _columns((values[0], values[1], values[2]), axes.ndim > 3)
     arm, w = _combined(axes, center), _local(axes, spin)
     moved, momentum = velocity + cross(spin, arm), total(tensor[:, k] * w[k : k + 1] for k in range(3))
@@ -386,7 +386,7 @@ def _energies(axes: Any, values: tuple[Any, ...], spin: Any, velocity: Any, posi
 
 
 def _of_inertia(axes: Any, values: tuple[Any, ...], spin: Any, spin_rate: Any, acceleration: Any) -> tuple[Any, Any]:
-    """Return force and moment about the origin that bodies need for a motion."""
+    """Return the inertial force of bodies in a motion, and its moment about the origin."""
     mass, center, tensor = _columns((values[0], values[1], values[2]), axes.ndim > 3)
     arm = _combined(axes, center)
     force = mass * (acceleration + cross(spin_rate, arm) + cross(spin, cross(spin, arm)))

@@ -1,4 +1,4 @@
-"""How a tree of bodies is scanned: what is carried from parents to children, and from coordinates to joints."""
+"""The scan of a tree of bodies: states passed from parents to children, and values from coordinates to joints."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from jounce.jet.algebra import total
 from jounce.robot.model.tree import Tree
 
 Series = Float[Numbers, "order coordinate batch"]
-"""Taylor coefficients of the coordinates of a robot, or of what belongs to them."""
+"""Taylor coefficients of the coordinates of a robot, or of values for each coordinate."""
 
 BodySeries = Float[Numbers, "order body batch"]
 """Taylor coefficients of one number for each moving body, or for its joint."""
@@ -28,7 +28,7 @@ def joint_coordinates(tree: Tree, q: Series) -> BodySeries:
 
 
 def at_joints(tree: Tree, values: Float[Numbers, "*leading coordinate batch"]) -> Float[Numbers, "*leading body batch"]:
-    """Return what changes of the coordinates are at the joints of the bodies, such as their rates."""
+    """Return changes of the joints of the bodies, such as rates, from those of the coordinates."""
     if tree.shape.direct:
         return values
     return total(jnp.take(values, at, axis=-2) * by for at, by in _followed(tree, values.ndim))
@@ -37,7 +37,7 @@ def at_joints(tree: Tree, values: Float[Numbers, "*leading coordinate batch"]) -
 def to_coordinates(
     tree: Tree, forces: Float[Numbers, "*leading body batch"]
 ) -> Float[Numbers, "*leading coordinate batch"]:
-    """Return generalized forces from those at the joints of the bodies."""
+    """Return generalized forces from joint forces of the bodies."""
     if tree.shape.direct:
         return forces
     whole = jnp.zeros((*forces.shape[:-2], tree.shape.coordinates, forces.shape[-1]))
@@ -47,49 +47,49 @@ def to_coordinates(
 
 
 def _followed(tree: Tree, dimensions: int) -> Iterator[tuple[Any, Any]]:
-    """Give the coordinates that joints follow, the first of each and so on, and by how much."""
+    """Yield the first coordinates that joints follow and their multipliers, then the second, and so on."""
     shape = (*(1,) * (dimensions - 2), -1, 1)
     for at, by in zip(jnp.asarray(tree.coordinate), jnp.asarray(tree.multiplier), strict=True):
         yield at, jnp.reshape(by, shape)
 
 
 def entries(tree: Tree) -> Tree:
-    """Return the arrays that have one entry for each body, which a scan takes apart."""
+    """Return the arrays with one entry for each body, as a scan needs them."""
     fields = ("armature", "damping", "friction", "friction_skew", "tendons", "balls", "gravity", "ancestors")
     fields += ("lift", "lift_moment", "coordinate", "multiplier")
     return dataclasses.replace(jax.tree.map(jnp.asarray, tree), **dict.fromkeys(fields))
 
 
 def fill_slots(tree: Tree, state: Any) -> Any:
-    """Return the places where states of parents are kept, all holding the given one."""
+    """Return the places for states of parents, all with a given state."""
     if tree.shape.slots == 1:
         return state
     return jax.tree.map(lambda x: jnp.broadcast_to(x, (tree.shape.slots, *x.shape)), state)
 
 
 def read_slot(tree: Tree, state: Any, slot: Any) -> Any:
-    """Return the state kept in a place; a chain has one place only."""
+    """Return the state in a place; a chain has only one place."""
     if tree.shape.slots == 1:
         return state
     return jax.tree.map(lambda x: jax.lax.dynamic_index_in_dim(x, slot, keepdims=False), state)
 
 
 def write_slot(tree: Tree, state: Any, slot: Any, value: Any) -> Any:
-    """Return the places with a new state in one of them."""
+    """Return the places with a new state in one place."""
     if tree.shape.slots == 1:
         return value
     return jax.tree.map(lambda x, y: jax.lax.dynamic_update_index_in_dim(x, y, slot, 0), state, value)
 
 
 def of_one_body(value: Any, body: Any, count: int) -> Any:
-    """Return values of one of many bodies as those of all, along the second axis: zero for the others.
+    """Return values of one body as an array for all bodies along the second axis, zero for other bodies.
 
-    Places are compared, and not one of them indexed: machine code has no place that is not known beforehand.
+    The function compares indices, because machine code has no indexing at places unknown in advance.
     """
     here = jnp.reshape(jnp.arange(count) == body, (1, count) + (1,) * (value.ndim - 1))
     return jnp.where(here, value[:, None], 0.0)
 
 
 def materialised(value: Any) -> Any:
-    """Return a value as it is, kept by XLA, which otherwise computes it again for every use: this halves the time."""
+    """Return a value that XLA stores instead of computing it again for every use, which halves the time."""
     return jax.lax.optimization_barrier(value)

@@ -1,4 +1,4 @@
-"""Whether a trajectory keeps limits: those of `check_limits`, and those of jounce, of points, and of the position."""
+"""The check of a trajectory against limits of `check_limits`, of jounce, of points, and by position."""
 
 import dataclasses
 import warnings
@@ -25,11 +25,11 @@ from jounce.trajectory.law_checks.breaks import at_breaks, distinct_instants, la
 
 EVEN = np.array([1.0, 0.0, 0.0, 0.0])  # z and its derivatives where the parameter is the time
 ZOOM, ZOOMS = 9, 8
-JOUNCE = 4  # the highest derivative that is limited
-SMALL = 1e-9  # of the size of a velocity of a point: a smaller jump is rounding
+JOUNCE = 4  # highest derivative with limits
+SMALL = 1e-9  # relative to the velocity of a point: a smaller jump is rounding
 
 _PARTNERS = {"acceleration": "deceleration"}
-_Infinite = Mapping[tuple[str, str], float]  # when a quantity of a joint is infinite, s
+_Infinite = Mapping[tuple[str, str], float]  # time at which a quantity of a joint is infinite, s
 
 
 def check_motion(
@@ -46,22 +46,22 @@ def check_motion(
     Parameters
     ----------
     robot : Robot
-        The robot, with what it holds.
+        The robot, with its payload.
     trajectory : JointTrajectory
-        Joints that it does not name stand still.
+        The trajectory; joints without a law in it stand still.
     limits : MotionLimits
-        With rows of their own in the report: limits of jounce, of points, and those that depend on the position.
+        Limits. Limits of jounce, of points, and limits that depend on the position have separate rows in the report.
     drives : bool, default True
         Whether torques contain armature inertia, damping and friction of the drives.
     hand_over : bool, default False
-        Whether the robot moves already as the trajectory starts, and goes on moving as it stops.
+        Whether the robot already moves at the start of the trajectory, and still moves at its end.
     loads : sequence of CarriedLoad, optional
-        What links carry during parts of the motion, by time.
+        Loads on links during parts of the motion, by time.
 
     Returns
     -------
     LimitReport
-        The rows of limits that depend on the position stand in the place of those without a limit.
+        The report; rows of limits that depend on the position replace rows without a limit.
     """
     given = limits_of(robot, limits)
     constant = {name: _without(entry, given.own(name)) for name, entry in given.joints.items()}
@@ -90,7 +90,7 @@ def check_motion(
 def _ends(
     source: RobotQuantities, trajectory: JointTrajectory, ends: tuple[TrajectoryEnd, ...], *, drives: bool
 ) -> tuple[TrajectoryEnd, ...]:
-    """Return what is met at both ends, with the limits of this check among those that are broken."""
+    """Return the ends of a trajectory, whose violated limits include those of this check."""
     robot, limits, points = source.robot, source.limits, source.limits.points
     followed = FollowedTrajectory(robot, trajectory, given=False)
     jumps = end_jumps(followed, followed.coordinates(np.linspace(trajectory.start, trajectory.stop, 2001), 4))
@@ -122,7 +122,7 @@ def _without(limits: Limits, varying: frozenset[str]) -> Limits:
 
 
 def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infinite) -> list[LimitRow]:
-    """Return the worst instants of what has other limits than constant ones."""
+    """Return the worst instants of quantities with limits that are not constant."""
 
     def ratios(times: np.ndarray) -> np.ndarray:
         return _curves(source, times).ratios(np.tile(EVEN[:, None], len(times)))
@@ -170,7 +170,7 @@ def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infin
 
 
 def _jumps(source: RobotQuantities, trajectory: JointTrajectory) -> np.ndarray:
-    """Return when jounce, and speeds and accelerations of points, are first infinite; NaN where they are not."""
+    """Return the first times of infinite jounce, and infinite speeds and accelerations of points, or NaN."""
     labels, points = source.labels, source.limits.points
     when = np.full(len(labels.every), np.nan)
     if not (points or source.with_jounce):
@@ -204,7 +204,7 @@ def _curves(source: RobotQuantities, times: np.ndarray) -> Curves:
 
 
 def _at_peaks(source: RobotQuantities, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the value of each curve at its own instant, and the bound there with the sign of the value."""
+    """Return the value of each curve at its own instant, and its bound with the sign of the value."""
     curves = _curves(source, times)
     parts = curves.values(np.tile(EVEN[:, None], len(times)))
     values, (_, second, rates, *_), q = np.concatenate(parts, axis=1), parts, curves.quantities

@@ -18,38 +18,38 @@ from jounce.robot.recursions.kinematics import forward_kinematics
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
 
-ORDER = 4  # derivatives of the path that are needed
+ORDER = 4  # necessary derivatives of the path
 CASES = np.array([[1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [1.0, 1.0]])
-"""Rates of s, and their derivatives by time, for which torques are taken: they are polynomials of these."""
+"""Samples of the rate of s and its time derivative, from which the polynomials of torques follow."""
 _Points = Float[np.ndarray, " _"]  # of any length
 _Table = Float[np.ndarray, "point column"]
 
 
 class RobotQuantities:
-    """Gives the limited quantities of a robot at points of a path.
+    """The limited quantities of a robot at points of a path.
 
     Parameters
     ----------
     robot : Robot
-        The robot, with what it holds.
+        The robot, with its payload.
     path : Path
-        Joints that it does not name stand still.
+        The path; joints that it does not name stand still.
     limits : MotionLimits, dict of str to Limits, or None
-        As `retime` takes them.
+        Limits as in `retime`.
     drives : bool
         Whether torques contain armature inertia, damping and friction of the drives.
     loads : sequence of CarriedLoad, optional
-        What links carry on parts of the path, by its parameter.
+        Loads on links on parts of the path, by its parameter.
 
     Attributes
     ----------
     changes : array of shape (change,)
-        Values of s where loads change.
+        Values of s at changes of loads.
 
     Raises
     ------
     RobotError, TrajectoryError
-        If names do not fit the robot, or nothing that moves has a limit.
+        If names do not fit the robot, or no moving joint or point has a limit.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class RobotQuantities:
         return self.shared.with_followers(q)
 
     def location(self, s: float) -> str:
-        """Say where on the path a value of s is."""
+        """Return the text of a place on the path."""
         q = self.path.derivatives(np.array([s]), 0)[0, 0]
         return f"s = {s:.6g} (q = {', '.join(f'{x:.4g}' for x in q)})"
 
@@ -123,7 +123,7 @@ class RobotQuantities:
         return np.concatenate(values, axis=1), np.concatenate(bounds, axis=1)
 
     def _second(self, q: np.ndarray, s: _Points) -> tuple[np.ndarray, _Table, _Table, _Table, _Table]:
-        """Return the coefficients of accelerations and torques; lowest and highest of them, and of their rates."""
+        """Return the coefficients of accelerations and torques, their bounds, and the bounds of their rates."""
         chosen = self.with_acceleration
         motion = q[:, :, chosen]
         nothing = np.zeros_like(motion[:, 0])
@@ -135,7 +135,7 @@ class RobotQuantities:
             slowing = np.where(np.isfinite(slower), slower, faster)
             speeding = np.where(
                 at_rest & (s == self.path.stop)[:, None], slowing, faster
-            )  # what arrives has slowed down
+            )  # the arriving motion slows down
             sides.append(np.where(at_rest | along, speeding, slowing))
         jerk, jerk_back = self.both_ways("jerk", chosen, q)
         tables = [(np.stack(parts, axis=-1), -sides[1], sides[0], -jerk_back, jerk)]
@@ -148,7 +148,7 @@ class RobotQuantities:
         return second, lower, upper, rate_lower, rate_upper
 
     def _torques(self, q: np.ndarray, s: _Points) -> Float[np.ndarray, "point joint 8"]:
-        """Return the coefficients of the torques: exact values for a few rates of s, and the polynomials they are."""
+        """Return the coefficients of the torques, polynomials through exact values for a few rates of s."""
         first, second = (x[:, None, None] for x in CASES.T)
         q = q[..., : len(self.robot.joint_names)]
         _, q1, q2, q3, _ = np.moveaxis(q, 1, 0)
@@ -171,12 +171,12 @@ class RobotQuantities:
         return np.stack(moved, axis=1), np.tile(np.array([point.acceleration for point in chosen], float), (len(q), 1))
 
     def point(self, q: np.ndarray, point: object) -> Float[np.ndarray, "point 3 3"]:
-        """Return the position, velocity and acceleration of a point for coordinates with derivatives."""
+        """Return the position of a point and two derivatives, for coordinates with derivatives."""
         q = q[:, :3, : len(self.robot.joint_names)]
         return np.asarray(forward_kinematics(self.robot, q, point.link, point.point).position)  # type: ignore[attr-defined]
 
     def _has(self, name: str, *fields: str) -> bool:
-        """Whether a joint has one of some limits."""
+        """Whether a joint has any of some limits."""
         constant, varying = self.own_limits[name], self.limits.varying.get(name, {})
         others, backward = {"jounce": self.limits.jounce.get(name)}, self.limits.backward.get(name, Limits())
         return any(
@@ -190,7 +190,7 @@ class RobotQuantities:
         return [k for k in self.moved if self._has(self.names[k], *fields)]
 
     def both_ways(self, field: str, chosen: list[int], q: np.ndarray) -> tuple[_Table, _Table]:
-        """Return the limits of some joints at points, above zero and below it."""
+        """Return the limits of some joints at points, for positive and for negative values."""
         forward = self._bounds(field, chosen, q)
         backward = forward.copy()
         for column, k in enumerate(chosen):
@@ -200,7 +200,7 @@ class RobotQuantities:
         return forward, backward
 
     def _bounds(self, field: str, chosen: list[int], q: np.ndarray) -> _Table:
-        """Return the limits of some joints at points, infinite where there is none."""
+        """Return the limits of some joints at points, infinite without a limit."""
         bounds = np.full((len(q), len(chosen)), np.inf)
         for column, k in enumerate(chosen):
             name = self.names[k]
@@ -244,7 +244,7 @@ class RobotQuantities:
         return Labels(*map(tuple, (first, second, rates, vectors, fourth)))
 
     def check_range(self) -> None:
-        """Raise TrajectoryError where the path leaves the range of a joint: no time law can mend that."""
+        """Raise TrajectoryError if the path leaves the range of a joint, since no time law can prevent that."""
         s = np.linspace(self.path.start, self.path.stop, 2001)
         q = self.whole(self.path.derivatives(s, 0))[:, 0]
         for column in self.moved:
