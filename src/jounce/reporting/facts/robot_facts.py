@@ -39,7 +39,7 @@ class LimitFacts(TypedDict):
 
 
 class MimicFacts(TypedDict):
-    """Which joint another one follows, or which several."""
+    """The joint, or joints, that a joint follows."""
 
     joint: str | list[str]
     multiplier: float | list[float]

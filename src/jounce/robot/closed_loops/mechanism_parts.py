@@ -44,7 +44,7 @@ def on_body(robot: AbstractRobot, link: str) -> tuple[str, np.ndarray, np.ndarra
 
 
 def rotor_on(base: str, rotor: str) -> JointPlacement:
-    """Return where a rotor turns on the ground, or on another rotor."""
+    """Return the placement of a rotor on the ground, or on another rotor."""
     origin, x, _, z = np.zeros(3), *np.eye(3)
     return JointPlacement((base, rotor), True, origin, z, z, x, x)
 
@@ -165,7 +165,7 @@ class RobotParts:
             if joint.mimic is not None:
                 follower, offset = joint.name, joint.mimic.offset
                 base = GROUND
-                for leader, rotor in self.sums.get(follower, {}).items():  # each turns on the one before
+                for leader, rotor in self.sums.get(follower, {}).items():  # each rotor turns on the preceding one
                     turning = self._add_rotor(rotor, base, joints)
                     pair = (self._named(leader), turning)
                     joints[self._unique_name(f"{follower}_{leader}{GEAR}", joints)] = coupled(
@@ -188,7 +188,7 @@ class RobotParts:
         return joints
 
     def _add_rotor(self, rotor: str, base: str, joints: dict[str, AbstractConstraint]) -> JointPlacement:
-        """Add the bearing of a rotor, and return its place."""
+        """Add the bearing of a rotor, and return its placement."""
         at = rotor_on(base, rotor)
         joints[self._unique_name(rotor, joints)] = spatial.Revolute(at.bodies, at.point, at.point, at.axis_i, at.axis_j)
         return at

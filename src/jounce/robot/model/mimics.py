@@ -12,21 +12,21 @@ from jounce.rigid.inertia import finite_numbers
 
 @dataclasses.dataclass(frozen=True)
 class Mimic:
-    """A joint that follows another one, or several: its coordinate is ``offset`` and the sum of ``multiplier * q``.
+    """A joint that follows another, or several: its coordinate is ``offset`` plus the sum of ``multiplier * q``.
 
     Parameters
     ----------
     joint : str or sequence of str
-        Names of the joints that are followed; these follow no other.
+        Names of the followed joints, which follow no other joint.
     multiplier : float or sequence of float, default 1
-        By how much faster this one moves than each; one number is that of all.
+        Speed of the follower relative to each followed joint; one number applies to all.
     offset : float, default 0
-        Its coordinate where those of the others are zero, rad or m.
+        Coordinate of the follower if those of the followed joints are zero, rad or m.
 
     Raises
     ------
     RobotError
-        If a number is not finite, there are not as many as joints, or these are none, or one of them twice.
+        If a number is not finite, their number differs from that of the joints, no joint is given, or one twice.
 
     Examples
     --------
@@ -51,16 +51,16 @@ class Mimic:
 
     @property
     def several(self) -> bool:
-        """Whether more than one joint is followed."""
+        """Whether the joint follows more than one joint."""
         return not isinstance(self.joint, str)
 
     @property
     def weights(self) -> dict[str, float]:
-        """The multipliers, by the names of the joints that are followed."""
+        """Multipliers, by the names of the followed joints."""
         return dict(zip(self.joint, self.multiplier, strict=True)) if self.several else {self.joint: self.multiplier}
 
     def after(self, mimics: Mapping[str, "Mimic"]) -> "Mimic":
-        """Return how the joint follows the leaders of those that it follows and that follow others."""
+        """Return the mimic with followers among the followed joints replaced by their leaders."""
         weights, offset = {}, self.offset
         for name, weight in self.weights.items():
             mimic = mimics.get(name) or Mimic(name)
@@ -70,20 +70,20 @@ class Mimic:
         return Mimic(tuple(weights), tuple(weights.values()), offset)
 
     def held(self, positions: Mapping[str, float]) -> "Mimic | float":
-        """Return how the joint follows those that are not held; its coordinate if all are."""
+        """Return the mimic without the held joints, or the coordinate if all followed joints are held."""
         offset = self.offset + sum(weight * positions[x] for x, weight in self.weights.items() if x in positions)
         left = {name: weight for name, weight in self.weights.items() if name not in positions}
         return Mimic(tuple(left), tuple(left.values()), offset) if left else offset
 
 
 def leaders(mimics: Mapping[str, Mimic]) -> dict[str, Mimic]:
-    """Return what joints follow, by name: those that follow a follower made to follow its leader; each follows one.
+    """Return the mimics of joints by name, each of one joint, with followers of a follower following its leader.
 
-    Circles are left as they are, for the robot to refuse.
+    Circles stay unchanged; the robot rejects them.
     """
     mimic_of: dict[str, Mimic] = {}
     for name in mimics:
-        chain: dict[str, Mimic] = {}  # from a follower to the first joint that is known, or leads
+        chain: dict[str, Mimic] = {}  # from a follower to the first joint that is done, or follows no other
         while name in mimics and name not in mimic_of and name not in chain:
             chain[name] = mimics[name]
             name = mimics[name].joint

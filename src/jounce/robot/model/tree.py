@@ -231,7 +231,7 @@ def arrange(
     whole = [Inertia.total(parts) if parts else MASSLESS for parts in masses]
     slots, parent_slots, count = _slots(parents)
     bodies, order = len(moving), [joint.name for joint in moving if joint.mimic is None]
-    mimics = [joint.mimic or Mimic(joint.name) for joint in moving]  # each follows others, or itself
+    mimics = [joint.mimic or Mimic(joint.name) for joint in moving]  # of others, or of the joint itself
     coordinate, multiplier = _leaders(mimics, order)
     friction = np.array([np.broadcast_to(joint.friction, 2) for joint in moving]).reshape(-1, 2) @ FORWARD_BACKWARD
     single = np.array([not mimic.several for mimic in mimics], float)  # drives of the others couple coordinates
@@ -303,7 +303,7 @@ def _lift(lifted: dict[int, list[tuple[Any, Any]]], frame: Frame, link: Link) ->
 
 
 def _tendons(moving: Sequence[Joint], order: Sequence[str], couplings: Sequence[Coupling]) -> Tendons:
-    """Return springs of joints, drives of those that follow several, and tendons, on the joints that are followed."""
+    """Return springs of joints, drives of followers of several joints, and tendons, at the followed joints."""
     rows = []
     for joint in moving:
         losses = (0.0, 0.0, 0.0)
