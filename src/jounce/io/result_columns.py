@@ -66,8 +66,10 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
                     raise OutputError(f"two outputs make a column of the same name, '{column}'")
                 columns_found[column] = np.asarray(row, float)
     if along == "time" and _derivative_count(list(columns_found)[1:]) > dataset.sizes.get("derivative", 1):
-        taken = next(name for name in columns_found if re.search("_d[0-9]+$", name))
-        raise OutputError(f"the output '{taken}' reads as a derivative in a table; give it another name, or write .nc")
+        conflicting = next(name for name in columns_found if re.search("_d[0-9]+$", name))
+        raise OutputError(
+            f"the output '{conflicting}' reads as a derivative in a table; give it another name, or write .nc"
+        )
     return columns_found
 
 
@@ -112,8 +114,8 @@ def dataset_of(header: list[str], table: Float[np.ndarray, "time columns"], unit
         sizes = (len(members),) if len(axes) == 1 else (3, 3)
         variables[name] = (("time", "derivative", *axes), values.reshape(*values.shape[:2], *sizes), unit)
         coordinates |= {axis: list(labels if len(axes) == 1 else AXES[("component",)]) for axis in axes}
-    if taken := [name for name in variables if name in coordinates]:
-        raise OutputError("the column has the name of an axis; give it another", name=taken[0])
+    if conflicting := [name for name in variables if name in coordinates]:
+        raise OutputError("the column has the name of an axis; give it another", name=conflicting[0])
     return xarray.Dataset(variables, coords=coordinates)
 
 

@@ -193,9 +193,9 @@ class Mechanism(Displayed):
         self._check_names()
         texts = {name: value for name, value in self.parameters.items() if isinstance(value, str)}
         before = {name: allowed[0] for name, allowed in self.dimensions.items() if len(allowed) == 1}
-        known = stated_dimensions(texts, before) if texts else before
+        known_dimensions = stated_dimensions(texts, before) if texts else before
         if texts:
-            values = {name: self._read(name, text, known) for name, text in texts.items()}
+            values = {name: self._read(name, text, known_dimensions) for name, text in texts.items()}
             object.__setattr__(self, "parameters", {**self.parameters, **values})
         object.__setattr__(self, "outputs", bound(self.outputs, self))
         check_redundant_reactions(self.redundant_reactions, (*self.joints, *self.drivers))
@@ -204,8 +204,8 @@ class Mechanism(Displayed):
             for name, element in elements.items():
                 self._check_element(kind, name, element)
         self._check_columns()
-        if stated := {name: (x,) for name, x in known.items() if name not in self.dimensions}:
-            check_stated_units(self, known)
+        if stated := {name: (x,) for name, x in known_dimensions.items() if name not in self.dimensions}:
+            check_stated_units(self, known_dimensions)
             object.__setattr__(self, "dimensions", {**self.dimensions, **stated})
         _ = self.shown_units
         for name in MAPPINGS:
@@ -354,12 +354,12 @@ class Mechanism(Displayed):
             check_name("parameter", name, self.parameters, MechanismError, name="parameters")
         return dataclasses.replace(self, parameters={**self.parameters, **values})
 
-    def _read(self, name: str, text: str, known: Mapping[str, Dimension]) -> Any:
+    def _read(self, name: str, text: str, dimensions: Mapping[str, Dimension]) -> Any:
         """Return the value of a parameter given as text, checked against the dimensions that it may have."""
         other_names = [other for other in self.parameters if other != name]
         allowed = self.dimensions.get(name, ())
         try:
-            given = parse_value(text, "any", other_names, known)
+            given = parse_value(text, "any", other_names, dimensions)
             if allowed and given.dimension is not None:
                 check_one_of(given.dimension, allowed, exactly=not isinstance(given.value, Expression))
         except JounceError as error:

@@ -212,7 +212,8 @@ def group_elements(
 
 def _stacked(elements: Sequence[Any], values: Sequence[Mapping[str, Any]]) -> Any:
     """Return one element with the values of several, and with the readings of methods that a user wrote."""
-    element, readings = stack_elements(elements, values), [its[READINGS] for its in values if READINGS in its]
+    element = stack_elements(elements, values)
+    readings = [field_values[READINGS] for field_values in values if READINGS in field_values]
     return with_readings(element, jax.tree.map(along_instances, *readings)) if readings else element
 
 

@@ -64,8 +64,8 @@ def check_samples(
     steps = np.diff(times)
     if (steps <= 0).any():
         first = int(np.argmax(steps <= 0))
-        what = "repeats the one before" if steps[first] == 0 else "comes before the one before"
-        message = f"times of samples must increase; this one {what}"
+        relation = "repeats the one before" if steps[first] == 0 else "comes before the one before"
+        message = f"times of samples must increase; this one {relation}"
         raise error(message, name=f"times[{first + 1}]", value=float(times[first + 1]))
     return times, values
 

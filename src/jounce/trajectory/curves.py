@@ -245,8 +245,8 @@ def _range(given: Any, count: int, parameters: Mapping[str, Any]) -> tuple[Any, 
 @lru_cache(maxsize=200)
 def _checked_once(formulas: Any, window: tuple[float, ...], stated: bool, closed: bool) -> None:
     names, parts = formulas
-    made = tuple(_Formula(expression, names, dict(known)) for expression, known in parts)
-    check_curve(made, window, stated=stated, closed=closed)
+    curve = tuple(_Formula(expression, names, dict(parameters)) for expression, parameters in parts)
+    check_curve(curve, window, stated=stated, closed=closed)
 
 
 def _checked(formulas: tuple[_Formula, ...], window: tuple[float, ...], stated: bool, closed: bool, count: int) -> None:

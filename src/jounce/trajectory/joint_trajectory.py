@@ -334,9 +334,9 @@ class JointTrajectory(Displayed):
         for column, name in enumerate(chosen):
             law = self.laws[name]
             if isinstance(law, SplineMotion):
-                known = law.errors[: order + 1]
-                errors[:, column] = 1.0 if known.any() else 0.0  # nothing is known above the degree
-                errors[: len(known), column] = known
+                law_errors = law.errors[: order + 1]
+                errors[:, column] = 1.0 if law_errors.any() else 0.0  # nothing is known above the degree
+                errors[: len(law_errors), column] = law_errors
         return errors
 
     def supported_order(self, tolerance: float = TOLERANCE, names: Iterable[str] | None = None) -> int:

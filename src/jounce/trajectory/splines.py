@@ -89,12 +89,12 @@ def _sums_before(terms: list[float]) -> list[float]:
 
     The rounding error of each addition is added up separately (the two-sum of Knuth).
     """
-    sums, total, lost = [], 0.0, 0.0
+    sums, total, compensation = [], 0.0, 0.0
     for term in terms:
-        sums.append(total + lost)
+        sums.append(total + compensation)
         raised = total + term
         own = raised - total
-        lost += (total - (raised - own)) + (term - own)
+        compensation += (total - (raised - own)) + (term - own)
         total = raised
     return sums
 

@@ -147,10 +147,10 @@ class Expression:
         names : iterable of str
             The defined names.
         """
-        known = names if isinstance(names, Mapping | AbstractSet) else set(names)
+        valid_names = names if isinstance(names, Mapping | AbstractSet) else set(names)
         for kind, operand, _, column in self._program:
-            if kind == "name" and operand not in known:
-                _refuse_name(operand, column, self.text, known)
+            if kind == "name" and operand not in valid_names:
+                _refuse_name(operand, column, self.text, valid_names)
 
     def evaluate(self, environment: Mapping[str, Any] | None = None) -> Any:
         """Return the value, in the units of the given values.
@@ -176,12 +176,12 @@ class Expression:
         >>> Expression("2*a**2 - 1").evaluate({"a": 3})
         17.0
         """
-        known = {} if environment is None else environment
+        values = {} if environment is None else environment
 
         def named(name: str, column: int) -> Any:
-            if name not in known:
-                _refuse_name(name, column, self.text, known)
-            value = known[name]
+            if name not in values:
+                _refuse_name(name, column, self.text, values)
+            value = values[name]
             return float(value) if isinstance(value, numbers.Real) else value
 
         return self._folded(float, named, self._apply)

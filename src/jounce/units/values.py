@@ -159,8 +159,8 @@ def parse_value(
         raise UnitError("must be a number, a number with a unit, or an expression")
     if isinstance(raw, str):
         variables = variables or {}
-        known = ChainMap(dict(variables), names) if isinstance(names, dict) else {*names, *variables}
-        return _parse_text(raw, kind, known, dimensions or {}, variables)
+        known_names = ChainMap(dict(variables), names) if isinstance(names, dict) else {*names, *variables}
+        return _parse_text(raw, kind, known_names, dimensions or {}, variables)
     try:
         number = float(raw)
     except OverflowError:
@@ -206,7 +206,7 @@ def stated_dimensions(
 def _parse_text(
     text: str,
     kind: str,
-    known: Collection[str],
+    known_names: Collection[str],
     dimensions: Mapping[str, Dimension],
     variables: Mapping[str, Dimension | None],
 ) -> Value:
@@ -217,14 +217,14 @@ def _parse_text(
         whole = f" or {comma[1]}{comma[2]} {comma[3] or ''}".rstrip() if len(comma[2]) == 3 else ""
         raise UnitError(f"a number has a decimal point and no thousands separator: write {point}{whole}")
     with_unit = _WITH_UNIT.fullmatch(text.strip())
-    if with_unit and not _divided_by_a_name(with_unit[2], known):
-        return _parse_with_unit(*with_unit.groups(), kind=kind, known=known, variables=variables)
+    if with_unit and not _divided_by_a_name(with_unit[2], known_names):
+        return _parse_with_unit(*with_unit.groups(), kind=kind, known_names=known_names, variables=variables)
     if text.strip().lower() in {".nan", "nan", "inf", ".inf", "-inf", "-.inf", "+inf", "infinity", "-infinity"}:
         raise UnitError("must be a finite number")
     try:
-        expression = Expression(text, known)
+        expression = Expression(text, known_names)
     except ExpressionError as error:
-        raise _with_units_named(error, text, known) from None
+        raise _with_units_named(error, text, known_names) from None
     if not expression.names:
         if _TIMES_DEG.fullmatch(expression.text):
             check_dimension(ANGLE, kind, show_value(expression.text))
@@ -258,9 +258,9 @@ def expression_in_si(text: str) -> Expression:
         raise UnitError(message, value=text) from error
 
 
-def _with_units_named(error: ExpressionError, text: str, known: Collection[str]) -> JounceError:
+def _with_units_named(error: ExpressionError, text: str, known_names: Collection[str]) -> JounceError:
     """Return an error about a number with a unit in an expression, if there is one; otherwise the given error."""
-    if (quantity := _unit_within(text, known)) is None:
+    if (quantity := _unit_within(text, known_names)) is None:
         return error
     message = (
         f"a number with a unit must stand alone: '{quantity}' cannot be a part of an expression; define a "
@@ -269,10 +269,10 @@ def _with_units_named(error: ExpressionError, text: str, known: Collection[str])
     return UnitError(message)
 
 
-def _unit_within(text: str, known: Collection[str]) -> str | None:
+def _unit_within(text: str, known_names: Collection[str]) -> str | None:
     """Return the first number with a unit in a text that is no expression; None if there is none."""
     for number, unit in _UNIT_WITHIN.findall(text)[:MOST_LOOKED_AT]:
-        if unit in known or unit in CONSTANTS:
+        if unit in known_names or unit in CONSTANTS:
             continue
         try:
             parse_unit(unit)
@@ -282,10 +282,10 @@ def _unit_within(text: str, known: Collection[str]) -> str | None:
     return None
 
 
-def _divided_by_a_name(unit: str, known: Collection[str]) -> bool:
+def _divided_by_a_name(unit: str, known_names: Collection[str]) -> bool:
     """Return whether a division by a name of an expression follows a number: 1/t is no number per tonne."""
     first = re.match(_ATOM, unit.lstrip("/ "))
-    return unit.startswith("/") and first is not None and (first.group() in known or first.group() == "pi")
+    return unit.startswith("/") and first is not None and (first.group() in known_names or first.group() == "pi")
 
 
 def _multiplied(sign: re.Match[str]) -> str:
@@ -294,13 +294,13 @@ def _multiplied(sign: re.Match[str]) -> str:
 
 
 def _parse_with_unit(
-    number: str, unit: str, *, kind: str, known: Collection[str], variables: Mapping[str, Dimension | None]
+    number: str, unit: str, *, kind: str, known_names: Collection[str], variables: Mapping[str, Dimension | None]
 ) -> Value:
     first = re.match(_ATOM, unit)
     named = next((atom for atom in re.finditer(_ATOM, unit) if atom.start() and atom[0] in variables), None)
     if named:  # in a law, t is no tonne
         before = unit[: named.start()].rstrip()
-        if set(re.findall(_ATOM, before)) <= {*known, *CONSTANTS}:
+        if set(re.findall(_ATOM, before)) <= {*known_names, *CONSTANTS}:
             raise UnitError(f"a product needs its *, as in {number}*{re.sub(_SIGN, _multiplied, unit)}")
         sign = "/" if before.endswith("/") else "*"
         given = f"{number} {before.rstrip(f'*/ {_DOTS}')}"
@@ -312,7 +312,7 @@ def _parse_with_unit(
         size, dimension = parse_unit(unit)
         check_dimension(dimension, kind, f"the unit of {show_value(f'{number} {unit}')}")
     except UnitError as error:
-        if first and first.group() in {*known, "pi", *FUNCTIONS}:
+        if first and first.group() in {*known_names, "pi", *FUNCTIONS}:
             raise UnitError(f"{error.message}; a product needs its *, as in {number}*{unit}") from None
         raise
     except (ArithmeticError, InvalidOperation):

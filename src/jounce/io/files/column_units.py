@@ -57,8 +57,8 @@ def in_units(dataset: xarray.Dataset, units: Mapping[str, str] | ShownUnits) -> 
     (128.272139, 'deg', 'm')
     """
     if not isinstance(units, ShownUnits):
-        known = {str(name): x.attrs["units"] for name, x in dataset.data_vars.items() if "units" in x.attrs}
-        units = ShownUnits(units, known)
+        stored_units = {str(name): x.attrs["units"] for name, x in dataset.data_vars.items() if "units" in x.attrs}
+        units = ShownUnits(units, stored_units)
     shown = dataset.copy()
     for name, variable in dataset.variables.items():
         if (unit := variable.attrs.get("units")) is None or name == "time":

@@ -78,18 +78,18 @@ def _yaml(data: Mapping[str, Any]) -> str:
 
     def styled(value: Any, flow: bool) -> Any:
         if isinstance(value, Mapping):
-            made = CommentedMap((styled(key, True), styled(entry, True)) for key, entry in value.items())
+            node = CommentedMap((styled(key, True), styled(entry, True)) for key, entry in value.items())
         elif isinstance(value, (list, tuple)):
-            made = CommentedSeq(styled(entry, True) for entry in value)
+            node = CommentedSeq(styled(entry, True) for entry in value)
         elif isinstance(value, str):
             return value if plain_scalar(value) is value else DoubleQuotedScalarString(value)
         else:
             return value
         if flow:
-            made.fa.set_flow_style()
+            node.fa.set_flow_style()
         else:
-            made.fa.set_block_style()
-        return made
+            node.fa.set_block_style()
+        return node
 
     whole = CommentedMap()
     for key, value in data.items():
@@ -109,9 +109,9 @@ def _toml(data: Mapping[str, Any]) -> str:
 
     def styled(value: Any) -> Any:
         if isinstance(value, Mapping):
-            made = tomlkit.inline_table()
-            made.update({key: styled(entry) for key, entry in value.items()})
-            return made
+            inline = tomlkit.inline_table()
+            inline.update({key: styled(entry) for key, entry in value.items()})
+            return inline
         if isinstance(value, (list, tuple)):
             listed = tomlkit.array()
             listed.extend(map(styled, value))

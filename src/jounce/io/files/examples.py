@@ -73,11 +73,11 @@ def copy_example(name: str, path: str | PathLike[str] | None = None, *, overwrit
     ['mine.yaml']
     """
     folder = examples_folder()
-    known = {_name(file, folder): file for file in folder.rglob("*") if file.suffix in _KINDS}
+    examples = {_name(file, folder): file for file in folder.rglob("*") if file.suffix in _KINDS}
     short = name.removesuffix(".yaml").removesuffix(".py").replace("-", "_")
-    if name not in known:
-        check_name("example", short, known, JounceError)
-    source = known.get(name) or known[short]
+    if name not in examples:
+        check_name("example", short, examples, JounceError)
+    source = examples.get(name) or examples[short]
     target = Path(source.name) if path is None else Path(path)
     pairs = [(source, target)]
     if source.suffix in (".yaml", ".py"):

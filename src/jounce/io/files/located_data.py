@@ -80,8 +80,8 @@ class Source:
             raise self.error("must be a mapping with at least one entry", location, value=entry)
         for key in entry:
             if keys is not None and key not in keys:
-                meant = (others or {}).get(key)
-                words = unknown("key", key, keys) if meant is None else f"the key for that is '{meant}'"
+                replacement = (others or {}).get(key)
+                words = unknown("key", key, keys) if replacement is None else f"the key for that is '{replacement}'"
                 raise self.error(words, (*location, key))
         return entry
 

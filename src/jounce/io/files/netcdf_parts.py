@@ -82,13 +82,13 @@ def _layout(example: Any, count: int) -> _Layout:
             attributes = dict(given.attrs)
             missing = attributes.pop("_FillValue", None)
             settings = {"dcpl": _preallocated_properties()} if along else {}
-            made = large.create_variable(name, given.dimensions, given.dtype, fillvalue=missing, **settings)
-            made.attrs.update(attributes)
+            variable = large.create_variable(name, given.dimensions, given.dtype, fillvalue=missing, **settings)
+            variable.attrs.update(attributes)
             if not along:
-                made[...] = given[...]
+                variable[...] = given[...]
                 continue
-            offset = made._h5ds.id.get_offset()
-            offsets[name] = offset, given.dimensions, made.dtype
+            offset = variable._h5ds.id.get_offset()
+            offsets[name] = offset, given.dimensions, variable.dtype
     return _Layout(file.size, file.blocks, offsets)
 
 

@@ -290,5 +290,5 @@ def is_input(path: str | PathLike[str]) -> bool:
         return False
     if real in _inputs:
         return True
-    same = [name for name, known in _inputs.items() if known == (status.st_dev, status.st_ino)]
+    same = [name for name, identity in _inputs.items() if identity == (status.st_dev, status.st_ino)]
     return any(Path(name).exists() and Path(name).samefile(real) for name in same)

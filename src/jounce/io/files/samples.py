@@ -93,8 +93,8 @@ def _sampled(
         raise table.error("samples need a column of times and one of values", line=1)
     first = table.find(time) if time is not None else table.header.index("time") if "time" in table.header else 0
     if value is None and len(table.header) != 2:
-        others = [column for k, column in enumerate(table.header) if k != first]
-        message = f"has several columns besides the time, name that of the value; {did_you_mean('', others)}"
+        value_columns = [column for k, column in enumerate(table.header) if k != first]
+        message = f"has several columns besides the time, name that of the value; {did_you_mean('', value_columns)}"
         raise table.error(message, line=1)
     return table, first, 1 - first if value is None else table.find(value)
 
@@ -127,8 +127,8 @@ def read_columns(
         columns[name] = np.array(table.column(k, (TIME,) if k == time else rates(("angle", "length"), order)))
     times = columns.pop(header[time])
     for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
-        what = "repeats" if times[k + 1] == times[k] else "comes before"
-        message = f"times must increase; this one {what} that of line {table.line(int(k))}"
+        relation = "repeats" if times[k + 1] == times[k] else "comes before"
+        message = f"times must increase; this one {relation} that of line {table.line(int(k))}"
         raise table.error(message, line=table.line(int(k) + 1), name="time", value=float(times[k + 1]))
     return (
         times,
@@ -172,13 +172,13 @@ def check_named(table: Table) -> int:
             "names: leave --csv out, and give the YAML"
         )
         raise table.error(message, line=line, value=", ".join(header[:3]))
-    known: set[str] = set()
+    earlier: set[str] = set()
     for k, name in enumerate(header):
         if not name:
             raise table.error(f"column {k + 1} has no name", line=line)
-        if name in known:
+        if name in earlier:
             raise table.error("two columns have this name", line=line, value=name)
-        known.add(name)
+        earlier.add(name)
     table.check_lengths()
     return line
 
@@ -314,8 +314,9 @@ class Table:
         unit = self.units[number]
         name = self.header[number]
         if unit is None:
-            if said := unit_unread(name, allowed):
-                message = f"this name seems to say {said}; units are read in brackets: write NAME [{said}], or another"
+            if unit_text := unit_unread(name, allowed):
+                hint = f"units are read in brackets: write NAME [{unit_text}], or another"
+                message = f"this name seems to say {unit_text}; {hint}"
                 raise self.error(message, line=self.header_line, value=name)
             return 1.0, NUMBER
         location = {"line": self.header_line, "name": name, "value": unit}

@@ -128,8 +128,8 @@ def _replace_target(scratch: Path, target: Path, before: os.stat_result | None) 
 def _copy_ownership(scratch: Path, before: os.stat_result) -> bool:
     """Give a file the owner and permissions of another; return whether the owner could be set."""
     if hasattr(os, "chown"):
-        made = scratch.stat()
-        if (made.st_uid, made.st_gid) != (before.st_uid, before.st_gid):
+        scratch_status = scratch.stat()
+        if (scratch_status.st_uid, scratch_status.st_gid) != (before.st_uid, before.st_gid):
             try:
                 os.chown(scratch, before.st_uid, before.st_gid)
             except OSError:

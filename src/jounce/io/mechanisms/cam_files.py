@@ -98,10 +98,10 @@ class _CamFile:
         assigned = assignments(
             given, "--set", "a parameter is set by NAME=VALUE, such as 'lift=12 mm'", MechanismFileError
         )
-        known = source.mapping(("parameters",)) if "parameters" in self.data else {}
+        parameters = source.mapping(("parameters",)) if "parameters" in self.data else {}
         for name in assigned:
-            check_name("parameter", name, known, MechanismFileError, name="--set")
-        for name, raw in known.items():
+            check_name("parameter", name, parameters, MechanismFileError, name="--set")
+        for name, raw in parameters.items():
             at = ("parameters", name)
             check_parameter_name(name, source.error_type, **source.error_fields(at))
             value = source.value(at, assigned.get(name, raw), "any", self.parameters, self.dimensions)
@@ -149,12 +149,12 @@ class _CamFile:
         if not follower.turning and (values := values_of(law, 0.0, 2 * math.pi)) is not None and values.any():
             lengths["law",] = float(abs(values).max())
         for at, length in lengths.items():
-            others = [x for place, x in lengths.items() if place != at]
-            if not others or (at != ("law",) and not self._is_plain(self.source.at(at))):
+            other_lengths = [x for place, x in lengths.items() if place != at]
+            if not other_lengths or (at != ("law",) and not self._is_plain(self.source.at(at))):
                 continue
-            if is_thousandfold(length, usual := statistics.median(others), FAR_OFF):
-                times, what = float(f"{length / usual:.1g}"), "goes to " if at == ("law",) else ""
-                words = f"{what}{length:.4g} m, {times:g} times the other lengths: {length:.4g} mm? {IN_SI}"
+            if is_thousandfold(length, usual := statistics.median(other_lengths), FAR_OFF):
+                times, prefix = float(f"{length / usual:.1g}"), "goes to " if at == ("law",) else ""
+                words = f"{prefix}{length:.4g} m, {times:g} times the other lengths: {length:.4g} mm? {IN_SI}"
                 fault = self.source.error(words, at)
                 warn_caller(UnitWarning(str(fault)))
 
@@ -176,7 +176,7 @@ class _CamFile:
         if kind not in FOLLOWERS:
             hint = did_you_mean(kind, FOLLOWERS)
             raise self.source.error(f"must be the type of a follower; {hint}", ("follower", "type"), value=kind)
-        made, keys = FOLLOWERS[kind]
+        follower_class, keys = FOLLOWERS[kind]
         self.source.mapping(("follower",), ("type", "shape", *keys))
         if "shape" not in data:
             raise self.source.error("is missing; valid: knife_edge, roller, flat_face", ("follower", "shape"))
@@ -184,7 +184,7 @@ class _CamFile:
         if kind == "oscillating" and "center_distance" not in data:
             raise self.source.error("is missing", ("follower", "center_distance"))
         try:
-            return made(data["shape"], **lengths)
+            return follower_class(data["shape"], **lengths)
         except JounceError as error:
             raise self.source.error(error.message, ("follower", str(error.name)), value=error.value) from None
 

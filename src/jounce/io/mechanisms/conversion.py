@@ -162,7 +162,7 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
         ends = {"parent": links[given.parent], "child": links[given.child]}
         return dataclasses.replace(given, name=file_names[given.name], mimic=mimic, **ends)
 
-    made = Robot(
+    renamed = Robot(
         robot.name,
         [dataclasses.replace(link, name=links[link.name]) for link in robot.links.values()],
         [joint(given) for given in robot.joints.values()],
@@ -174,7 +174,7 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
         robot.strict,
         [_with_joints(given, file_names) for given in robot.couplings.values()],
     )
-    return made, changed
+    return renamed, changed
 
 
 def _with_joints(coupling: Any, names: Mapping[str, str]) -> Any:
@@ -232,12 +232,12 @@ def robot_mechanism(
             message = "the coordinates of a robot with loops depend on one another; name the driven ones by --drive"
             raise RobotError(message, name="--hold", value=list(robot.closures))
         laws |= {name: float(start.get(name, 0.0)) for name in robot.joint_names if name not in laws}
-    made = robot.mechanism(dict(start), drivers=laws, drives=drives, time=TimeGrid(0.0, 1.0, 0.01))
-    if any(body.mass for body in made.bodies.values()):
+    mechanism = robot.mechanism(dict(start), drivers=laws, drives=drives, time=TimeGrid(0.0, 1.0, 0.01))
+    if any(body.mass for body in mechanism.bodies.values()):
         loads: dict[str, Any] = {}
         for name in laws:
             turning = robot.joints[name].turning
             kind, word = (DriverTorqueOutput, "torque") if turning else (DriverForceOutput, "force")
             loads[f"{name}_{word}"] = kind(driver=name + DRIVE)
-        made = dataclasses.replace(made, outputs={**made.outputs, **loads})
-    return made
+        mechanism = dataclasses.replace(mechanism, outputs={**mechanism.outputs, **loads})
+    return mechanism

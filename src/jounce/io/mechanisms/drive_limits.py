@@ -57,11 +57,11 @@ def load_drive_limits(path: str | PathLike[str], mechanism: Mechanism) -> dict[s
     source = read_source(path, kind="limits", error_type=MechanismFileError)
     data = source.mapping((), ("title", "drivers", "outputs"))
     limits: dict[str, Limits] = {}
-    for kind, known in (("drivers", mechanism.drivers), ("outputs", mechanism.outputs)):
+    for kind, elements_of_kind in (("drivers", mechanism.drivers), ("outputs", mechanism.outputs)):
         for name in source.mapping((kind,)) if kind in data else ():
             at: Location = (kind, name)
-            if name not in known:
-                raise source.error(no_such(kind[:-1], name, list(known)), at)
+            if name not in elements_of_kind:
+                raise source.error(no_such(kind[:-1], name, list(elements_of_kind)), at)
             if name in limits:
                 raise source.error("a driver and an output of one name cannot both have limits; rename one", at)
             keys = (*RATES, *EFFORTS) if kind == "drivers" else tuple(RATES)

@@ -91,8 +91,8 @@ def with_leaders(source: Source, space: str, elements: dict[str, dict[str, Any]]
     def leader(name: str) -> Any:
         for kind in ("drivers", "joints", "initial"):
             if name in elements[kind]:
-                known = elements[kind][name]
-                return known.follower if isinstance(known, CamEntry) else known
+                element = elements[kind][name]
+                return element.follower if isinstance(element, CamEntry) else element
         motion = OutputMotion(name, "0")
         return driver_of_output(SimpleNamespace(space=space, outputs=elements["outputs"]), motion, "motion.of")
 

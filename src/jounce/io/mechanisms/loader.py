@@ -80,8 +80,8 @@ def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()
         raise
     except JounceError as error:
         location = _find(error.name, locations)
-        known = location if source.line(location) is not None else ()
-        raise source.error(error.message, known or location, value=error.value) from None
+        located = location if source.line(location) is not None else ()
+        raise source.error(error.message, located or location, value=error.value) from None
     warn_of_units(source, mechanism)
     return mechanism
 
@@ -257,9 +257,9 @@ def _find(name: str | None, locations: _Locations) -> Location:
     """Return the location in the file of a dotted name of the mechanism."""
     if not name:
         return ()
-    for known, (location, keys) in locations.items():
-        if name.startswith(f"{known}."):
-            return (*location, *location_of(keys, name.removeprefix(f"{known}.")))
-        if name == known:
+    for owner, (location, keys) in locations.items():
+        if name.startswith(f"{owner}."):
+            return (*location, *location_of(keys, name.removeprefix(f"{owner}.")))
+        if name == owner:
             return location
     return tuple(name.split("."))

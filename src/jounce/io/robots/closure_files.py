@@ -213,8 +213,8 @@ def rotor_doubt(inertia: float, ratio: float, values: Mapping[str, Any]) -> str:
     """Return a doubt about a rotor without a unit that is too heavy for a motor behind gears, or an empty text."""
     if not isinstance(values.get("rotor_inertia"), int | float) or inertia < HEAVY or abs(ratio) < GEARED:
         return ""
-    seen = f"a rotor of {inertia:g} kg*m^2 is {inertia * ratio**2:.3g} kg*m^2 behind a gear ratio of {ratio:g}"
-    return f"{seen}: {inertia:g} kg*cm^2? A number without a unit is in SI"
+    doubt = f"a rotor of {inertia:g} kg*m^2 is {inertia * ratio**2:.3g} kg*m^2 behind a gear ratio of {ratio:g}"
+    return f"{doubt}: {inertia:g} kg*cm^2? A number without a unit is in SI"
 
 
 def _dimensions(key: str, turning: bool) -> tuple[Dimension, ...]:

@@ -108,9 +108,9 @@ class _DrivesFile:
             if name in own and own[name] is None:
                 continue
             entry = self.source.mapping((self.key, name), KEYS) if name in own else {}
-            taken = default if fitting[kind] else {}
-            locations = dict.fromkeys(taken, ("default",)) | dict.fromkeys(entry, (self.key, name))
-            values = {key: raw for key, raw in {**taken, **entry}.items() if raw is not None}
+            defaults = default if fitting[kind] else {}
+            locations = dict.fromkeys(defaults, ("default",)) | dict.fromkeys(entry, (self.key, name))
+            values = {key: raw for key, raw in {**defaults, **entry}.items() if raw is not None}
             if values:
                 drives[name] = self._drive(values, locations, kind)
         return drives

@@ -163,8 +163,8 @@ class _LimitsFile:
             self._check_default(key)
         limits = {name: self._of(name, default, joints.get(name, {})) for name in self.robot.joint_names}
         if doubt := next(iter(self.doubts.values()), None):
-            others = f" (and {count - 1} like it)" if (count := len(self.doubts)) > 1 else ""
-            warn_caller(UnitWarning(f"{doubt}{others} {IN_SI}"))
+            similar = f" (and {count - 1} like it)" if (count := len(self.doubts)) > 1 else ""
+            warn_caller(UnitWarning(f"{doubt}{similar} {IN_SI}"))
         try:
             return self.robot.limits_with(limits)
         except RobotError as error:
@@ -340,8 +340,8 @@ def _doubt(number: float, key: str, joint: Joint) -> str:
     other = unit.replace("rad", "deg") if joint.turning else unit.replace("m", "mm", 1)
     size, part = abs(number), DEGREES if joint.turning else MILLIMETERS
     limits = joint.limits
-    known = (limits.velocity,) if key == "velocity" else (limits.lower, limits.upper)
-    own = max((abs(x) for x in known if x is not None), default=0.0)
+    bounds = (limits.velocity,) if key == "velocity" else (limits.lower, limits.upper)
+    own = max((abs(x) for x in bounds if x is not None), default=0.0)
     if own:
         if not (size > FAR_OFF * own and own / ALIKE < size / part < own * ALIKE):
             return ""

@@ -96,8 +96,8 @@ def as_read_by(reader: str, path: str | PathLike[str], robot: Robot) -> list[For
     root = read_markup(fspath(path))
     valid = OF_FORMAT.get(root.tag, ())
     if reader not in valid:
-        known = f"known readers of it: {', '.join(valid)}" if valid else "no reader of this format is known"
-        raise root.error(f"how {reader} reads this format has not been examined; {known}", "reader", value=reader)
+        readers = f"known readers of it: {', '.join(valid)}" if valid else "no reader of this format is known"
+        raise root.error(f"how {reader} reads this format has not been examined; {readers}", "reader", value=reader)
     return list(_of_mjcf(path, robot) if root.tag == "mujoco" else _of_urdf(reader, root, robot))
 
 
@@ -170,8 +170,8 @@ def _single(reader: str, name: str, robot: Robot) -> ForeignJoint:
 
 def _of_several(reader: str, name: str, kind: str, element: Element, *, first: bool) -> ForeignJoint:
     """Return a joint of several coordinates."""
-    known = {"planar": ("pinocchio", "mujoco", "drake"), "floating": tuple(FREE), "spherical": ("mujoco",)}[kind]
-    if reader not in known or (kind == "floating" and reader == "drake" and not first):
+    readers = {"planar": ("pinocchio", "mujoco", "drake"), "floating": tuple(FREE), "spherical": ("mujoco",)}[kind]
+    if reader not in readers or (kind == "floating" and reader == "drake" and not first):
         message = f"how {reader} numbers this {kind} joint has not been examined"
         raise element.error(message, "joints", name, value=kind)
     if kind == "planar":
@@ -218,16 +218,16 @@ def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[ForeignJoint]:
     waiting = [joint for joint in robot.joints.values() if joint.moving or joint.name in names]
     for name, joint in zip(names, spec.joints, strict=True):
         count = {mujoco.mjtJoint.mjJNT_FREE: 6, mujoco.mjtJoint.mjJNT_BALL: 3}.get(joint.type, 1)
-        made, waiting = waiting[:count], waiting[count:]
-        if len(made) < count:
+        parts, waiting = waiting[:count], waiting[count:]
+        if len(parts) < count:
             raise RobotFileError("MuJoCo has more joints than were read", path=fspath(path), name=name)
-        ours = tuple(part.name for part in made)
+        ours = tuple(part.name for part in parts)
         if count == 6:
             positions, velocities, note = FREE["mujoco"]
             yield ForeignJoint(name, ours, positions, velocities, note=note)
         elif count == 3:
             yield ForeignJoint(name, ours, TURN, SPIN, note="velocities along the axes of the link")
-        elif made[0].moving:
-            yield _single("mujoco", made[0].name, robot)
+        elif parts[0].moving:
+            yield _single("mujoco", parts[0].name, robot)
         else:
             yield ForeignJoint(name, (), factors=({},), note="an equality holds it where it is; we have it fixed")

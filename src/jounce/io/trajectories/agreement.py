@@ -151,8 +151,8 @@ def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[i
         groups = len(times) - count - 3  # number of groups with two neighbors on each side
         left, right = slice(1, groups + 1), slice(count + 2, count + 2 + groups)
         turn = rate[right] - rate[left]
-        seen = np.stack([slopes[k : k + groups] for k in range(1, count + 2)])
-        change = np.abs(turn) + np.abs(rate[count + 3 :] - rate[:groups]) + np.ptp(seen, axis=0)
+        windows = np.stack([slopes[k : k + groups] for k in range(1, count + 2)])
+        change = np.abs(turn) + np.abs(rate[count + 3 :] - rate[:groups]) + np.ptp(windows, axis=0)
         far = np.full(groups, np.inf)
         for k in range(2, count + 2):
             own = slice(k, k + groups)

@@ -84,15 +84,15 @@ def export_trajectory(
     >>> trajectory = jn.load_trajectory("examples/trajectories/ur5_stack.yaml")
     >>> times = jn.io.export_trajectory(robot, trajectory, "stack.csv", "ur")  # doctest: +SKIP
     """
-    known = FORMATS.get(checked_format(format))
-    check_target(path, (".csv",) if known else (".yaml", ".yml"), f"{format} trajectory", overwrite=overwrite)
-    names = _chosen(robot, trajectory, known, format, joints)
-    frequency = _checked_rate(known, format, rate)
-    if known is None:
+    controller = FORMATS.get(checked_format(format))
+    check_target(path, (".csv",) if controller else (".yaml", ".yml"), f"{format} trajectory", overwrite=overwrite)
+    names = _chosen(robot, trajectory, controller, format, joints)
+    frequency = _checked_rate(controller, format, rate)
+    if controller is None:
         text, times = _message(robot, trajectory, names, frequency, torques, loads)
     else:
         text, times = _table(
-            robot, trajectory, names, frequency, known, torques=torques, loads=loads, units=header_units
+            robot, trajectory, names, frequency, controller, torques=torques, loads=loads, units=header_units
         )
     with replacing(path, overwrite=overwrite) as scratch:
         scratch.write_text(text, encoding="utf-8")
@@ -100,7 +100,11 @@ def export_trajectory(
 
 
 def _chosen(
-    robot: Robot, trajectory: JointTrajectory, known: ControllerFormat | None, name: str, joints: Sequence[str] | None
+    robot: Robot,
+    trajectory: JointTrajectory,
+    controller: ControllerFormat | None,
+    name: str,
+    joints: Sequence[str] | None,
 ) -> tuple[str, ...]:
     """Return the joints to write, in the order of the controller."""
     for joint in trajectory.names:
@@ -112,19 +116,19 @@ def _chosen(
         check_name("joint of the trajectory", joint, trajectory.names, TrajectoryError, name="joints")
         if joint in names[:k]:
             raise TrajectoryError("a joint is named twice", name="joints", value=joint)
-    if known is not None and len(names) != known.joints:
-        message = f"the format {name} has {known.joints} joints; name those that it is for, in its order"
+    if controller is not None and len(names) != controller.joints:
+        message = f"the format {name} has {controller.joints} joints; name those that it is for, in its order"
         raise TrajectoryError(message, name="joints", value=list(names))
     return names
 
 
-def _checked_rate(known: ControllerFormat | None, name: str, rate: float | None) -> float:
+def _checked_rate(controller: ControllerFormat | None, name: str, rate: float | None) -> float:
     if rate is None:
-        return known.rates[0] if known else 100.0
+        return controller.rates[0] if controller else 100.0
     if not (np.isfinite(rate) and rate > 0):
         raise TrajectoryError("must be greater than zero", name="rate", value=rate)
-    if known is not None and rate not in known.rates:
-        valid = " or ".join(f"{x:g}" for x in sorted(known.rates))
+    if controller is not None and rate not in controller.rates:
+        valid = " or ".join(f"{x:g}" for x in sorted(controller.rates))
         raise TrajectoryError(f"the format {name} takes {valid} rows a second", name="rate", value=rate)
     return float(rate)
 
@@ -135,7 +139,7 @@ def _values(
     names: tuple[str, ...],
     times: Any,
     efforts: int,
-    known: Any,
+    controller: Any,
     loads: Sequence[CarriedLoad],
 ) -> list[np.ndarray]:
     """Return positions, velocities, accelerations, torques and their rates at instants, (time, joints) each."""
@@ -148,9 +152,9 @@ def _values(
     columns = [robot.joint_names.index(name) for name in names]
     values = [q[:, k, columns] for k in range(3)]
     if efforts:
-        felt = robot if known is None or known.gravity else robot.with_gravity([0.0, 0.0, 0.0])
+        felt = robot if controller is None or controller.gravity else robot.with_gravity([0.0, 0.0, 0.0])
         loaded = LoadedRobot(felt, in_time(loads), trajectory.start, trajectory.stop)
-        tau = loaded.torques(q, times, known is None or known.drives)
+        tau = loaded.torques(q, times, controller is None or controller.drives)
         values += [tau[:, k, columns] for k in range(efforts)]
     return values
 
@@ -160,7 +164,7 @@ def _table(
     trajectory: JointTrajectory,
     names: tuple[str, ...],
     frequency: float,
-    known: ControllerFormat,
+    controller: ControllerFormat,
     *,
     torques: bool,
     loads: Sequence[CarriedLoad],
@@ -170,9 +174,9 @@ def _table(
     rows = int(np.floor(duration * frequency * (1 + 1e-12) + 1e-9))
     exact = duration * frequency - rows <= 1e-6
     times = trajectory.start + np.arange(rows + (1 if exact else 2)) / frequency
-    levels = (*known.levels, *(known.efforts if torques else ()))
+    levels = (*controller.levels, *(controller.efforts if torques else ()))
     inside = np.minimum(times, trajectory.stop)
-    values = _values(robot, trajectory, names, inside, len(known.efforts) if torques else 0, known, loads)
+    values = _values(robot, trajectory, names, inside, len(controller.efforts) if torques else 0, controller, loads)
     fastest, hardest = (float(np.abs(level[-1]).max()) for level in values[1:3])
     if not exact and (fastest > REST_SPEED or hardest > UNFORCED):
         message = (
@@ -182,7 +186,7 @@ def _table(
         )
         raise TrajectoryError(message, name="rate", value=frequency)
     kinds = [_units(robot, name) for name in names]
-    heading = [f"{known.time} [s]" if units else known.time]
+    heading = [f"{controller.time} [s]" if units else controller.time]
     for k, level in enumerate(levels):
         unit_texts = [f" [{kind[k]}]" if units else "" for kind in kinds]
         heading += [f"{level}_{j}{unit}" for j, unit in enumerate(unit_texts)]

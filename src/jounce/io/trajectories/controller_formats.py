@@ -59,15 +59,15 @@ NAMES = (*FORMATS, "ros")
 
 def format_of(columns: Sequence[str]) -> ControllerFormat | None:
     """Return the format whose positions are among the columns; None for other tables."""
-    for known in FORMATS.values():
-        if known.time in columns and f"{known.levels[0]}_0" in columns:
-            return known
+    for controller in FORMATS.values():
+        if controller.time in columns and f"{controller.levels[0]}_0" in columns:
+            return controller
     return None
 
 
-def joint_count(known: ControllerFormat, columns: Sequence[str]) -> int:
+def joint_count(controller: ControllerFormat, columns: Sequence[str]) -> int:
     """Return the number of joints with positions in a table."""
-    pattern = re.compile(rf"{known.levels[0]}_([0-9]+)$")
+    pattern = re.compile(rf"{controller.levels[0]}_([0-9]+)$")
     return sum(pattern.match(name) is not None for name in columns)
 
 

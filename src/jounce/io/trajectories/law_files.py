@@ -121,9 +121,9 @@ class LawFile:
         if len(initial) > derivative:
             message = f"must have at most {derivative} values: the coordinate and what is below the measured derivative"
             raise self.source.error(message, location, value=initial)
-        known = [self._number(raw, "any", (*location, k), k, joint) for k, raw in enumerate(initial)]
+        initial_values = [self._number(raw, "any", (*location, k), k, joint) for k, raw in enumerate(initial)]
         if derivative:
-            return self._with_location(at, lambda: MeasuredMotion(times, values, derivative, known, degree))
+            return self._with_location(at, lambda: MeasuredMotion(times, values, derivative, initial_values, degree))
         return self._with_location(at, lambda: SplineMotion(times, values, degree))
 
     def _whole(self, raw: Any, at: Location) -> int:
@@ -141,9 +141,9 @@ class LawFile:
         data = self.source.mapping(at, _MOTION_KEYS)
         self._check_given(at, ("from", "to"))
         first, last = (self.source.mapping((*at, key)) for key in ("from", "to"))
-        for here, there, key in ((first, last, "to"), (last, first, "from")):
-            for name in here:
-                if name not in there:
+        for names, other_names, key in ((first, last, "to"), (last, first, "from")):
+            for name in names:
+                if name not in other_names:
                     message = f"the joint {show_value(name)} is missing; 'from' and 'to' name the same joints"
                     raise self.source.error(message, (*at, key))
         start = [self._number(first[name], "any", (*at, "from", name), joint=name) for name in first]
@@ -198,8 +198,8 @@ class LawFile:
         """Return a number in SI units, or an expression of the parameters and of other names."""
         value = self.source.value(at, raw, kind, (*self.parameters, *names), self.dimensions)
         if kind == "any" and value.dimension and not is_rate(value.dimension, ("angle", "length"), per_time):
-            what = f"must be an angle or a length{per_power(per_time)}, not {describe_dimension(value.dimension)}"
-            raise self.source.error(what, at, value=raw)
+            message = f"must be an angle or a length{per_power(per_time)}, not {describe_dimension(value.dimension)}"
+            raise self.source.error(message, at, value=raw)
         if joint is not None:
             self._note(joint, value.dimension, at)
         return value.value
@@ -219,6 +219,6 @@ class LawFile:
             name = error.name or ""
             entry, last = self.source.at(at), name.rpartition(".")[2]
             inside = isinstance(entry, dict) and last in entry
-            known = inside or not name or name.split(".")[0] in at
-            message = error.message if known else f"{name}: {error.message}"
+            is_located = inside or not name or name.split(".")[0] in at
+            message = error.message if is_located else f"{name}: {error.message}"
             raise self.source.error(message, (*at, last) if inside else at, value=error.value) from None

@@ -189,15 +189,15 @@ def _named_by(recording: Recording, robot: Robot) -> Recording:
 
 def _positions_only(recording: Recording, robot: Robot | None) -> Recording:
     """Return a recording without columns whose names, unknown to the robot, are those of torques or the like."""
-    known = () if robot is None else robot.joints
-    others = [name for name in recording.names if name in recording.others and name not in known]
-    if not others:
+    joint_names = () if robot is None else robot.joints
+    other_names = [name for name in recording.names if name in recording.others and name not in joint_names]
+    if not other_names:
         return recording
-    listed = ", ".join(others)
-    positions = [name for name in recording.names if name not in others]
+    listed = ", ".join(other_names)
+    positions = [name for name in recording.names if name not in other_names]
     if not positions:
         message = f"columns hold positions, and these have names of other quantities: {listed}; {CHOOSE}"
-        raise TrajectoryError(message, path=recording.path, name=others[0])
+        raise TrajectoryError(message, path=recording.path, name=other_names[0])
     note = f"by their names no positions, and left out: {listed}; {CHOOSE}"
     chosen = recording.selected(positions)
     return dataclasses.replace(chosen, notes=(*chosen.notes, note))

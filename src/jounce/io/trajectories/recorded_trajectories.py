@@ -83,19 +83,19 @@ def trajectory_of(
 
 def _as_points(recording: Recording, joint: int) -> AbstractMotion:
     table = recording.values[:, :, joint]
-    known = ~np.isnan(table)
-    skipped = np.flatnonzero((known[:, 1:] & ~known[:, :-1]).any(axis=1))
+    present = ~np.isnan(table)
+    skipped = np.flatnonzero((present[:, 1:] & ~present[:, :-1]).any(axis=1))
     if len(skipped):
         message = "accelerations without velocities: the controller goes through such points by neither"
         raise recording.error(message, int(skipped[0]), name=recording.names[joint])
-    rows = known[:, 0]
+    rows = present[:, 0]
     return HermiteMotion(recording.times[rows], _trimmed(table[rows]), incomplete=True)
 
 
 def _trimmed(table: Float[np.ndarray, "row level"]) -> Float[np.ndarray, "row known"]:
     """Return a table without the levels that no two adjacent points have."""
-    known = ~np.isnan(table)
-    both = (known[1:] & known[:-1]).any(axis=0)
+    present = ~np.isnan(table)
+    both = (present[1:] & present[:-1]).any(axis=0)
     return table[:, : int(np.argmin(np.append(both, False)))]
 
 
@@ -116,6 +116,6 @@ def _as_samples(recording: Recording, joint: int, degree: int) -> AbstractMotion
     return HermiteSplineMotion(times, table[:, :levels])
 
 
-def complete_levels(known: Bool[np.ndarray, "row level"]) -> int:
+def complete_levels(present: Bool[np.ndarray, "row level"]) -> int:
     """Return the number of levels that all rows have."""
-    return int(np.argmin(np.append(known.all(axis=0), False)))
+    return int(np.argmin(np.append(present.all(axis=0), False)))

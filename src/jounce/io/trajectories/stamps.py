@@ -116,10 +116,10 @@ def epoch(first: Decimal, per_second: int = 1, unit: str | None = None) -> tuple
     scales = SCALES[:1] if per_second == NANO else SCALES
     if unit is not None:
         scales = [(EPOCH * 10**digits, digits, name) for _, digits, name in SCALES if name == unit]
-    known = next(((digits, unit) for least, digits, unit in scales if abs(first) >= least), None)
-    if known is None:
+    scale = next(((digits, unit) for least, digits, unit in scales if abs(first) >= least), None)
+    if scale is None:
         return None
-    digits, unit = known
+    digits, unit = scale
     return digits, f"stamps are counted from an epoch, in {unit}: t = 0 is {first.scaleb(-digits):f} s"
 
 
@@ -217,9 +217,9 @@ def _merged(recording: Recording) -> Recording:
     first = np.flatnonzero(np.append(True, np.diff(times) > 0))
     values = np.zeros((len(first), *recording.values.shape[1:]))
     counts = np.zeros_like(values)
-    known = ~np.isnan(recording.values)
-    np.add.at(values, group, np.where(known, recording.values, 0.0))
-    np.add.at(counts, group, known)
+    present = ~np.isnan(recording.values)
+    np.add.at(values, group, np.where(present, recording.values, 0.0))
+    np.add.at(counts, group, present)
     with np.errstate(invalid="ignore"):
         values = np.where(counts > 0, values / counts, np.nan)
     rows = int(differ.any(axis=1).sum())

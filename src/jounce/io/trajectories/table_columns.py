@@ -163,8 +163,8 @@ def columns_of(header: Sequence[str]) -> Columns | None:
     TrajectoryError
         If two columns may hold the same quantity of one joint.
     """
-    for known in (_of_rostopic, _of_libfranka, _of_plotjuggler, _of_numbers, _of_names):
-        columns = known(header)
+    for reader in (_of_rostopic, _of_libfranka, _of_plotjuggler, _of_numbers, _of_names):
+        columns = reader(header)
         if columns is not None:
             return columns
     return None

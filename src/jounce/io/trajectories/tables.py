@@ -47,15 +47,15 @@ def read_recording(path: str, joints: Iterable[str] | None = None) -> Recording:
     line = check_named(table)
     join_stamps(table)
     take_units(table)
-    known = format_of(table.header)
+    controller = format_of(table.header)
     try:
-        columns = _of_controller(table, known) if known else columns_of(table.header)
+        columns = _of_controller(table, controller) if controller else columns_of(table.header)
     except TrajectoryError as error:
         raise error.located(path=path, line=line) from None
     if columns is None:
         table.find("time")  # raises an error if there is none
         raise table.error("there is no column besides 'time'; give one for each joint", line=line)
-    recording = in_sequence(_recording(table, columns, points=known is not None))
+    recording = in_sequence(_recording(table, columns, points=controller is not None))
     if joints is not None:
         if not recording.unnamed:
             message = "this file names its joints; give names for what controllers take only"
@@ -64,14 +64,14 @@ def read_recording(path: str, joints: Iterable[str] | None = None) -> Recording:
     return recording
 
 
-def _of_controller(table: Table, known: ControllerFormat) -> Columns:
+def _of_controller(table: Table, controller: ControllerFormat) -> Columns:
     """Return the columns of a table for a controller; only commanded values are read."""
-    levels = [level for level in known.levels if f"{level}_0" in table.header]
+    levels = [level for level in controller.levels if f"{level}_0" in table.header]
     joints = {
         f"joint_{j}": {k: table.find(f"{level}_{j}") for k, level in enumerate(levels)}
-        for j in range(joint_count(known, table.header))
+        for j in range(joint_count(controller, table.header))
     }
-    return Columns(table.find(known.time), joints, unnamed=True)
+    return Columns(table.find(controller.time), joints, unnamed=True)
 
 
 def _recording(table: Table, columns: Columns, *, points: bool) -> Recording:

@@ -97,8 +97,8 @@ def made_or_stored(contents: Contents | None, make: Callable[[], T], owned: Call
     """
     if contents is None:
         return make()
-    if (known := _results.get(contents)) is not None:
-        return known
+    if (stored := _results.get(contents)) is not None:
+        return stored
     result = make()
     if contents in _results and (copy := owned(result)) is not None:
         _results[contents] = result = copy

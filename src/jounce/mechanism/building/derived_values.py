@@ -60,14 +60,14 @@ def with_turn_unit(group: Group, length: Any) -> Group:
     return with_field(group, "unit", length * np.ones((group.instances, 1)))
 
 
-def with_derived_of(group: Group, known: Group) -> Group:
+def with_derived_of(group: Group, source: Group) -> Group:
     """Return a group with the offsets and signs of another group, which were derived from a position."""
     if measures_angle(group):
-        return with_datum_of(group, known)
+        return with_datum_of(group, source)
     if hasattr(group.element, "sense"):
-        return with_field(group, "sense", known.element.sense)
+        return with_field(group, "sense", source.element.sense)
     if counts_turns(group):
-        return with_field(group, "unit", known.element.unit)
+        return with_field(group, "unit", source.element.unit)
     if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
         return group
-    return with_field(group, "offset", known.element.offset)
+    return with_field(group, "offset", source.element.offset)

@@ -52,7 +52,7 @@ def _carriage_guess(
     pose_type, key = (PlanarPose, "angle") if components == 2 else (SpatialPose, "quaternion")
     body_i, body_j = (
         pose_at({"position": position, key: attitude}, pose_type)
-        for position, attitude in (poses[its] for its in element.bodies)
+        for position, attitude in (poses[index] for index in element.bodies)
     )
     point = body_i.to_body(body_j.point(values["point_j"]) - body_i.position).coefficients[0]
     try:

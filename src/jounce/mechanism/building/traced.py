@@ -58,7 +58,7 @@ def template(tree: Any) -> tuple[list[Any], Callable[[Sequence[Any]], Any]]:
     """
     values: list[Any] = []
     maker = _maker(tree, values)
-    return values, (lambda _: tree) if maker is None else lambda others: maker(iter(others))
+    return values, (lambda _: tree) if maker is None else lambda leaves: maker(iter(leaves))
 
 
 def _maker(value: Any, values: list[Any]) -> Callable[[Iterator[Any]], Any] | None:

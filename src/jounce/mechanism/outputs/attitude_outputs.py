@@ -125,8 +125,8 @@ def continued(
         Instants in the order of the motion, (places,), and the angles there, up to whole turns, (3, places), close
         enough to each other that no turn is missed.
     """
-    between, known = passed
-    whole = np.concatenate([known, angles], axis=1)
+    between, previous = passed
+    whole = np.concatenate([previous, angles], axis=1)
     times = np.concatenate([between, instants])
     order = np.argsort(-times if between.size > 1 and between[-1] < between[0] else times, kind="stable")
     order = order[np.isfinite(whole[:, order]).all(axis=0)]

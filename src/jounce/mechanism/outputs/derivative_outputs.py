@@ -255,7 +255,9 @@ def _operand(key: str, name: str, outputs: Mapping[str, AbstractQuantity], mecha
     stem = _base_output(name, outputs, mechanism)
     if not stem:
         labels = {other: output.component_labels(mechanism) for other, output in outputs.items()}
-        valid_names = [each for other, its in labels.items() for each in ([f"{other}_{x}" for x in its] or [other])]
+        valid_names = [
+            each for other, components in labels.items() for each in ([f"{other}_{x}" for x in components] or [other])
+        ]
         raise MechanismError(no_such("output", name, valid_names), name=key, value=name)
     labels = outputs[stem].component_labels(mechanism)
     if labels and stem == name:

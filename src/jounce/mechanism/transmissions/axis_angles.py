@@ -163,11 +163,13 @@ def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...
     return _with_data(groups, near, lambda datum, turns: with_fields(datum, near=turns))
 
 
-def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Datum, Any], Datum]) -> tuple[Group, ...]:
+def _with_data(
+    groups: Sequence[Group], values: Sequence[Any], update: Callable[[Datum, Any], Datum]
+) -> tuple[Group, ...]:
     """Return groups with changed data; `values` holds one value for each group that measures angles."""
     remaining = iter(values)
     return tuple(
-        with_field(g, "datum", put(g.element.datum, next(remaining))) if measures_angle(g) else g for g in groups
+        with_field(g, "datum", update(g.element.datum, next(remaining))) if measures_angle(g) else g for g in groups
     )
 
 

@@ -344,7 +344,7 @@ def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group
         ]
         if any(other is None for other in other_axes):
             continue
-        first, second = (along_instances(*(as_array(x.value) for x in its if x)) for its in (axes, other_axes))
+        first, second = (along_instances(*(as_array(x.value) for x in vectors if x)) for vectors in (axes, other_axes))
         part, datum = getattr(group.element, field), _coaxial(first, second)
         if part.vector_j is not None:  # the component along the axis has no effect
             datum = with_fields(datum, across=_across(part.vector_j, second))

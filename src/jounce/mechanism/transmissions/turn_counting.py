@@ -70,7 +70,7 @@ def refined_samples(measure: Measure, path: Paths, share: Shares, angle: Angles 
 
 
 def counted_along(
-    measure: Measure, run: Int[np.ndarray, " step"], begun: Float[np.ndarray, "angle step"], samples: int
+    measure: Measure, run: Int[np.ndarray, " step"], initial: Float[np.ndarray, "angle step"], samples: int
 ) -> PathSamples:
     """Count angles along the steps of many runs; each step is a path with shares from 0 to 1.
 
@@ -80,7 +80,7 @@ def counted_along(
         Returns angles, up to whole turns, at shares of steps.
     run : array of int, shape (steps,)
         Run of each step; the steps of a run are consecutive.
-    begun : array of shape (angles, steps)
+    initial : array of shape (angles, steps)
         Angles at the beginning of the run of each step, to within half a turn.
     samples : int
         Least number of samples in a step.
@@ -90,7 +90,7 @@ def counted_along(
     begins = np.append(True, np.diff(run[step]) != 0)
     rise = np.where(begins, 0.0, np.nan_to_num(principal(np.diff(angle, axis=1, prepend=angle[:, :1]))))
     first = np.flatnonzero(begins)[np.cumsum(begins) - 1]  # first sample of the run of each sample
-    counted, initial_angles = np.cumsum(rise, axis=1), begun[:, step]
+    counted, initial_angles = np.cumsum(rise, axis=1), initial[:, step]
     return PathSamples(
         step, share, initial_angles + principal(angle[:, first] - initial_angles) + counted - counted[:, first]
     )

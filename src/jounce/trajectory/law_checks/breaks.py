@@ -43,11 +43,11 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
     >>> law_breaks([ramp, bent], 0.0, 1.0, 4).round(9).tolist()
     [0.1, 0.25, 0.75]
     """
-    breaks, seen = [np.zeros(0)], LeaderValues()
+    breaks, leader_values = [np.zeros(0)], LeaderValues()
     every = {id(law): law for law in _with_leaders(laws)}.values()  # several laws may have one leader
     for law in every if last > first else ():
         level = min(order + 1, HIGHEST)
-        instants, jumps, _ = known_jumps(law, first, last, level, seen)
+        instants, jumps, _ = known_jumps(law, first, last, level, leader_values)
         jump, bend = np.any(jumps[:-1] != 0, axis=0), jumps[-1] != 0
         breaks.append(instants[jump | bend if np.sum(jump | bend) <= MOST else jump])
         if may_bend(law):

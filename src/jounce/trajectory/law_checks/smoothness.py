@@ -182,7 +182,7 @@ class LeaderValues:
 
 
 def known_jumps(
-    law: AbstractMotion, first: float, last: float, order: int, seen: LeaderValues | None = None
+    law: AbstractMotion, first: float, last: float, order: int, leader_values: LeaderValues | None = None
 ) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"], bool]:
     """Return the instants of known jumps of derivatives up to an order, the jumps, and whether these are all jumps.
 
@@ -194,7 +194,7 @@ def known_jumps(
         Interval of time, s.
     order : int
         Highest derivative.
-    seen : LeaderValues, optional
+    leader_values : LeaderValues, optional
         Known values of leaders, for calls with several laws.
 
     Examples
@@ -204,7 +204,7 @@ def known_jumps(
     >>> instants.tolist(), sizes[:, 0].tolist(), all_of_them  # expressions may have kinks of their own
     ([1.0], [0.0, 1.0, 0.0], False)
     """
-    instants, sizes, _ = _jumps(law, first, last, order, seen)
+    instants, sizes, _ = _jumps(law, first, last, order, leader_values)
     return instants, sizes, _is_of_polynomials(law)
 
 
@@ -216,18 +216,18 @@ def _is_of_polynomials(law: AbstractMotion) -> bool:
 
 
 def _jumps(
-    law: AbstractMotion, first: float, last: float, order: int = HIGHEST, seen: LeaderValues | None = None
+    law: AbstractMotion, first: float, last: float, order: int = HIGHEST, leader_values: LeaderValues | None = None
 ) -> tuple[np.ndarray, Float[np.ndarray, "levels knots"], str]:
     """Return the instants in an interval at which derivatives jump, the jumps, and a description of unknown ones."""
-    none, seen = (np.zeros(0), np.zeros((order + 1, 0))), seen or LeaderValues()
+    none, leader_values = (np.zeros(0), np.zeros((order + 1, 0))), leader_values or LeaderValues()
     match law:
         case OutputMotion() if law.parts:
-            return _jumps(law.parts[0], first, last, order, seen)
+            return _jumps(law.parts[0], first, last, order, leader_values)
         case FollowingMotion() if law.parts:
             following, leader = law.parts
-            return _followed(following, leader, first, last, order, seen)
+            return _followed(following, leader, first, last, order, leader_values)
         case IntegratedMotion() if law.parts:
-            instants, sizes, unknown = _jumps(law.parts[0], first, last, max(order - 1, 0), seen)
+            instants, sizes, unknown = _jumps(law.parts[0], first, last, max(order - 1, 0), leader_values)
             return instants, np.concatenate([np.zeros((1, len(instants))), sizes])[: order + 1], unknown
         case PiecewiseMotion() if law.parts:
             return _of_pieces(law, first, last, order)
@@ -290,7 +290,7 @@ def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> t
 
 
 def _followed(
-    law: AbstractMotion, leader: AbstractMotion, first: float, last: float, order: int, seen: LeaderValues
+    law: AbstractMotion, leader: AbstractMotion, first: float, last: float, order: int, leader_values: LeaderValues
 ) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the jumps of a law of the coordinate of a leader, at the instants at which the leader passes its knots.
 
@@ -298,31 +298,31 @@ def _followed(
     jet of the leader at the passage.
     """
     none = np.zeros(0), np.zeros((order + 1, 0))
-    own, _, unknown = _jumps(leader, first, last, order, seen)
+    own, _, unknown = _jumps(leader, first, last, order, leader_values)
     if len(own):
         unknown = LOOKED
     if isinstance(law, SplineMotion) and not knot_jumps(law, order)[1].any():
         return *none, unknown
     looks = np.linspace(first, last, INTERVALS + 1)
-    values = seen.coefficients(leader, looks)[0]
-    knots, jumps, less = _jumps(law, float(values.min()), float(values.max()), order, seen)
+    values = leader_values.coefficients(leader, looks)[0]
+    knots, jumps, less = _jumps(law, float(values.min()), float(values.max()), order, leader_values)
     if not jumps.any():
         return *none, unknown or less
-    peaks = [np.abs(c).max(where=np.isfinite(c), initial=0.0) for c in seen.coefficients(leader, looks, order)]
+    peaks = [np.abs(c).max(where=np.isfinite(c), initial=0.0) for c in leader_values.coefficients(leader, looks, order)]
     step = (last - first) / INTERVALS
     # the leader may begin or end at a knot, which it then passes outside the interval
     looks = np.concatenate([[first - step], looks, [last + step]])
-    values = seen.coefficients(leader, looks)[0]
+    values = leader_values.coefficients(leader, looks)[0]
     jumping = jumps.any(axis=0)
     knots, jumps = knots[jumping], jumps[:, jumping]
     which, crossing = _knots_between(values, knots)
     if not len(which):
         return *none, unknown or less
-    times = _crossings(leader, knots[which], looks[crossing], looks[crossing + 1], seen)
+    times = _crossings(leader, knots[which], looks[crossing], looks[crossing + 1], leader_values)
     inside = (times > first - SLACK * step) & (times < last + SLACK * step)
     sequence = np.flatnonzero(inside)[np.argsort(times[inside])]
     which, crossing, times = which[sequence], crossing[sequence], np.clip(times[sequence], first, last)
-    passing = seen.coefficients(leader, times, order)
+    passing = leader_values.coefficients(leader, times, order)
     change = _composed(jumps[:, which], np.stack([0 * times, *passing[1:]]))  # exactly at the knot
     bound = _composed(np.abs(jumps), np.stack([0.0, *peaks[1:]])[:, None])[:, which]
     forward = np.where(values[crossing] < knots[which], 1.0, -1.0)
@@ -355,7 +355,7 @@ def _composed(
 
 
 def _crossings(
-    leader: AbstractMotion, knots: np.ndarray, low: np.ndarray, high: np.ndarray, seen: LeaderValues
+    leader: AbstractMotion, knots: np.ndarray, low: np.ndarray, high: np.ndarray, leader_values: LeaderValues
 ) -> np.ndarray:
     """Return the instants at which a leader passes values, each within a bracket, to rounding.
 
@@ -364,7 +364,7 @@ def _crossings(
     every, count = np.arange(len(knots)), len(AMONG) + 2 * len(CLOSE) + 1
 
     def distance(instants: np.ndarray) -> np.ndarray:
-        return seen.coefficients(leader, instants.reshape(-1))[0].reshape(instants.shape) - knots
+        return leader_values.coefficients(leader, instants.reshape(-1))[0].reshape(instants.shape) - knots
 
     under, over = distance(low), distance(high)
     below = under < 0

@@ -80,9 +80,9 @@ def _values(law: AbstractMotion, grid: Values) -> Values:
     cubic with the same ends.
     """
     if isinstance(law, ExpressionMotion):
-        known = {name: float(value) for name, value in law.parameters.items()}
+        parameters = {name: float(value) for name, value in law.parameters.items()}
         with np.errstate(all="ignore"):
-            values = law.expression.folded(float, {**known, "t": grid}.__getitem__, _operated)
+            values = law.expression.folded(float, {**parameters, "t": grid}.__getitem__, _operated)
         return np.broadcast_to(np.asarray(values, float), grid.shape)
     if isinstance(law, FollowingMotion) and law.parts:
         own, leader = law.parts
@@ -122,8 +122,8 @@ def _operated(word: str, arguments: list[Any]) -> Any:
 def _is_polynomial(law: AbstractMotion) -> TypeGuard[SplineMotion]:
     if not isinstance(law, SplineMotion) or np.ndim(law.stop):
         return False
-    known = type(law)._within in (SplineMotion._within, SegmentedMotion._within)
-    return known and type(law)._evaluated is SplineMotion._evaluated
+    piecewise = type(law)._within in (SplineMotion._within, SegmentedMotion._within)
+    return piecewise and type(law)._evaluated is SplineMotion._evaluated
 
 
 def _spline_values(law: SplineMotion, grid: Values) -> Values:
@@ -239,5 +239,5 @@ def trajectory_doubt(laws: dict[str, Any], first: float, last: float, limits: di
     if not doubts:
         return ""
     name, why = next(iter(doubts.items()))
-    others = f" (and {count - 1} joint{'s' if count > 2 else ''} like it)" if (count := len(doubts)) > 1 else ""
-    return f"{name} {why}{others} A number without a unit is in SI; head the column '{name} [deg]', or convert to rad"
+    similar = f" (and {count - 1} joint{'s' if count > 2 else ''} like it)" if (count := len(doubts)) > 1 else ""
+    return f"{name} {why}{similar} A number without a unit is in SI; head the column '{name} [deg]', or convert to rad"

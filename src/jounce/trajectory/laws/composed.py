@@ -29,8 +29,8 @@ class CompositeLaw(AbstractMotion):
         for k, part in enumerate(read):
             if not isinstance(part, AbstractMotion | Expression):
                 raise TrajectoryError("must be a motion law, or an expression of t", name=f"[{k}]", value=part)
-        known = all(_is_known(part) for part in read)
-        self.parts = tuple(with_values(part, {}) for part in read) if known else ()
+        constant = all(_is_known(part) for part in read)
+        self.parts = tuple(with_values(part, {}) for part in read) if constant else ()
         self.recipe = Untraced((tuple(read), *rest))
 
     @property

@@ -194,12 +194,12 @@ def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]
         fitted = samples[:, : DEGREE + 1] @ _FITTED.T
         sizes = jnp.maximum(largest, jnp.max(jnp.abs(samples), axis=1))
         off = jnp.max(jnp.abs(samples[:, DEGREE + 1 :] - fitted @ _SEEN.T), axis=1)
-        known = jnp.isfinite(off)
-        noise = 4.0 * jnp.min(jnp.where(known, off, jnp.inf))  # not resolved by shorter panels, either
+        finite = jnp.isfinite(off)
+        noise = 4.0 * jnp.min(jnp.where(finite, off, jnp.inf))  # not resolved by shorter panels, either
         fine = off <= jnp.maximum(RESOLVED * sizes, jnp.minimum(noise, ROUNDING * sizes))
         own = jnp.max(jnp.abs(samples), axis=1)
-        jumps = (tried <= shortest) & known & (own <= STEEPER * jnp.maximum(own[0], largest))  # not a pole
-        fine = known & (fine | jumps)
+        jumps = (tried <= shortest) & finite & (own <= STEEPER * jnp.maximum(own[0], largest))  # not a pole
+        fine = finite & (fine | jumps)
         any_fine = jnp.any(fine)
         pick = jnp.where(any_fine, jnp.argmax(fine), len(NARROWED) - 1)
         # only the accepted panel has slopes by parameters: others may have unbounded values

@@ -216,8 +216,10 @@ class PolynomialMotion(SplineMotion):
         length, beginning = np.diff(knots), knots[:-1] - origin
         rest = []
         for k in range(m):  # part of each power of the local time that is not in the term of the left knot value
-            known = (-1) ** (m + k) * math.comb(m + 1, k) / math.factorial(m + 1) * length ** (m - k) * highest[:-1]
-            rest.append(self.coefficients[k] - known)
+            contribution = (
+                (-1) ** (m + k) * math.comb(m + 1, k) / math.factorial(m + 1) * length ** (m - k) * highest[:-1]
+            )
+            rest.append(self.coefficients[k] - contribution)
         constants = []
         for power in range(m - 1, -1, -1):  # with local time tau - beginning, powers of tau by the binomial sum
             shifted = [rest[k] * math.comb(k, power) * (-beginning) ** (k - power) for k in range(power, m)]

@@ -44,7 +44,7 @@ def _stacked(laws: Sequence[AbstractMotion]) -> tuple[list[AbstractMotion], Memb
         leaves, structure = jax.tree.flatten(law)
         groups.setdefault((structure, tuple(map(np.shape, leaves))), []).append(index)
     members = tuple(map(tuple, groups.values()))
-    return [jax.tree.map(_along_joints, *(laws[index] for index in its)) for its in members], members
+    return [jax.tree.map(_along_joints, *(laws[index] for index in indices)) for indices in members], members
 
 
 def _along_joints(*leaves: Any) -> Any:

@@ -111,8 +111,8 @@ def given_law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
     """Return the law of a joint of a trajectory; see `law_or_number`."""
     if not isinstance(name, str) or not name:
         raise TrajectoryError("the name of a joint must be text", name="laws", value=name)
-    taken = law_or_number("laws", name, law)
-    return ExpressionMotion(repr(taken)) if isinstance(taken, int | float) else taken
+    checked = law_or_number("laws", name, law)
+    return ExpressionMotion(repr(checked)) if isinstance(checked, int | float) else checked
 
 
 def read_laws(tree: Any) -> Any:

@@ -78,10 +78,10 @@ def _spline(times: np.ndarray, table: np.ndarray) -> HermiteMotion:
     steps = np.diff(times)
     begin, end = _at_ends(levels)  # derivative levels + 1 of a piece of length 1, for each value at its ends
     powers = steps[:, None] ** np.arange(levels + 1)
-    known = np.concatenate([table[:-1] * powers[:, :levels], table[1:] * powers[:, :levels]], axis=1)
+    given_terms = np.concatenate([table[:-1] * powers[:, :levels], table[1:] * powers[:, :levels]], axis=1)
     columns = [*range(levels), *range(levels + 1, 2 * levels + 1)]
     scale = steps ** (levels + 1)
-    left, right = (known @ row[columns] / scale for row in (begin, end))  # at the beginning, at the end of each piece
+    left, right = (given_terms @ row[columns] / scale for row in (begin, end))  # at both ends of each piece
     own = steps**levels / scale
     bands, right_side = np.zeros((3, count)), np.zeros(count)
     # inside: the derivative is continuous between pieces
@@ -94,7 +94,7 @@ def _spline(times: np.ndarray, table: np.ndarray) -> HermiteMotion:
         mine, other = (levels, 2 * levels + 1) if row == 0 else (2 * levels + 1, levels)
         bands[1, row] = top[mine] * own[piece]
         bands[0 if row == 0 else 2, neighbor] = top[other] * own[piece]
-        right_side[row] = -known[piece] @ top[columns] / scale[piece]
+        right_side[row] = -given_terms[piece] @ top[columns] / scale[piece]
     higher = solve_banded((1, 1), bands, right_side)
     return HermiteMotion(times, np.column_stack([table, higher]))
 

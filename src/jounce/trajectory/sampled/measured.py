@@ -102,10 +102,10 @@ class MeasuredMotion(SplineMotion):
         """Return the law with numbers in the place of expressions of parameters."""
         if not self._open:
             return self
-        known = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in self.initial.value]
+        initial_values = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in self.initial.value]
         times, values = self.samples.value
         degree = self.degree - self.derivative
-        return MeasuredMotion(times, values, self.derivative, known, degree, self.extrapolation)
+        return MeasuredMotion(times, values, self.derivative, initial_values, degree, self.extrapolation)
 
     @property
     def _open(self) -> list[str]:
@@ -154,10 +154,10 @@ def _advance(pieces: Any, ends: Float[np.ndarray, " breakpoints"], derivative: i
     for level, gain in enumerate(gains):
         size = math.factorial(level) * float(np.max(np.abs(pieces[level]))) + abs(float(gain))
         if abs(float(gain)) > CLOSED * size and (level or beyond == "repeat"):
-            what = f"its derivative {level}" if level else "the law"
+            subject = f"its derivative {level}" if level else "the law"
             advice = "change the samples or initial" if level else "close it, or choose beyond: advance"
             message = (
-                f"samples of a derivative that repeat: {what} ends {float(gain):.6g} from where it began; {advice}"
+                f"samples of a derivative that repeat: {subject} ends {float(gain):.6g} from where it began; {advice}"
             )
             raise MechanismError(message, name="beyond", value=beyond)
     return float(gains[0]) if beyond == "advance" else 0.0
@@ -166,12 +166,12 @@ def _advance(pieces: Any, ends: Float[np.ndarray, " breakpoints"], derivative: i
 def _checked(initial: Any, derivative: int) -> tuple[Any, ...]:
     """Return the values at the first sample after a check, padded by zeros."""
     try:
-        known = [Expression(x) if isinstance(x, str) else x for x in initial]
-        known = [x.evaluate() if isinstance(x, Expression) and not x.names else x for x in known]
-        known = [x if isinstance(x, Expression | Tracer) else float(x) for x in known]
+        initial_values = [Expression(x) if isinstance(x, str) else x for x in initial]
+        initial_values = [x.evaluate() if isinstance(x, Expression) and not x.names else x for x in initial_values]
+        initial_values = [x if isinstance(x, Expression | Tracer) else float(x) for x in initial_values]
     except (TypeError, ValueError):
         raise MechanismError("must be a list of numbers", name="initial", value=initial) from None
-    if len(known) > derivative or not np.isfinite([x for x in known if isinstance(x, float)]).all():
+    if len(initial_values) > derivative or not np.isfinite([x for x in initial_values if isinstance(x, float)]).all():
         message = f"must be at most {derivative} finite numbers: the law and its derivatives below the measured one"
-        raise MechanismError(message, name="initial", value=known)
-    return (*known, *(0.0,) * (derivative - len(known)))
+        raise MechanismError(message, name="initial", value=initial_values)
+    return (*initial_values, *(0.0,) * (derivative - len(initial_values)))

@@ -95,8 +95,8 @@ def unknown_type(
         if isinstance(name, str) and name in types(other_space, other_role)
     ]
     note = f"it is the type of {' and '.join(elsewhere)}; " if elsewhere else ""
-    meant = [word for word in valid if str(name).lower() in _OTHER_WORDS.get(word, ()) and not elsewhere]
-    hint = f"it is called '{meant[0]}' here" if meant else note + did_you_mean(name, valid)
+    synonyms = [word for word in valid if str(name).lower() in _OTHER_WORDS.get(word, ()) and not elsewhere]
+    hint = f"it is called '{synonyms[0]}' here" if synonyms else note + did_you_mean(name, valid)
     message = f"no {space} {role} has this type; {hint}"
     return source.error(message, (*at, "type"), value=name)
 

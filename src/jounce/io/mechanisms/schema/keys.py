@@ -62,7 +62,7 @@ def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
     fields = value_fields(kind)
     groups: dict[str, list[str]] = {}
     parts = getattr(kind, "parts", {})
-    within = {field for its in parts.values() for field in its.values()}
+    within = {field for members in parts.values() for field in members.values()}
     for name in (name for name in fields if name not in within):
         stem, _, body = name.rpartition("_")
         groups.setdefault(stem if stem in _PLURALS and body in ("i", "j", "m") else name, []).append(name)
@@ -72,7 +72,9 @@ def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
         key = stem if len(names) == 1 else _PLURALS[stem]
         required = first.default is MISSING and first.default_factory is MISSING
         keys.append(FileKey(key, tuple(names), field_kind(first), facts_of(kind).dimensions[names[0]], required))
-    keys += [FileKey(key, tuple(its.values()), "parts", "any", True, tuple(its)) for key, its in parts.items()]
+    keys += [
+        FileKey(key, tuple(members.values()), "parts", "any", True, tuple(members)) for key, members in parts.items()
+    ]
     return tuple(sorted(keys, key=lambda k: k.kind != "text"))
 
 

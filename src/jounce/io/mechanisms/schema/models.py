@@ -121,9 +121,9 @@ def _names(counts: Sequence[int]) -> Any:
 def _check_body(name: Any, info: Any, *at: int) -> str:
     if not isinstance(name, str):
         raise problem("must be the name of a body", *at, value=name)
-    known = (info.context or {}).get("bodies", ())
-    if name not in known:
-        raise problem(no_such("body", name, known), *at, value=name)
+    bodies = (info.context or {}).get("bodies", ())
+    if name not in bodies:
+        raise problem(no_such("body", name, bodies), *at, value=name)
     return name
 
 

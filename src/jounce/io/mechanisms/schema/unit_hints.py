@@ -99,13 +99,13 @@ def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], op
         warned = True
         warnings.warn(UnitWarning(f"{option} {name}: {hint} {IN_SI}"), stacklevel=3)
     run = _run(before)
-    known = {law.name for law in laws_of_angles(before) if degrees_doubt(law.law, *run)}
+    doubted_before = {law.name for law in laws_of_angles(before) if degrees_doubt(law.law, *run)}
     run = _run(after)
     for law in laws_of_angles(after):
         if not (why := degrees_doubt(law.law, *run)):
             continue
         settle(law.driver)
-        if not warned and law.name not in known:
+        if not warned and law.name not in doubted_before:
             warnings.warn(UnitWarning(f"{option}: now the law of drivers.{law.name} {why} {IN_SI}"), stacklevel=3)
 
 
@@ -343,8 +343,8 @@ def _angles(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Locati
 
 def _angles_of_leaders(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, Any]]:
     """Yield the angles of leaders at which segments and pieces of laws end, the largest one of each law."""
-    for section, known in (("drivers", mechanism.drivers), ("joints", mechanism.joints)):
-        for name, element in known.items():
+    for section, elements in (("drivers", mechanism.drivers), ("joints", mechanism.joints)):
+        for name, element in elements.items():
             law = ((data.get(section) or {}).get(name) or {}).get("motion")
             if not isinstance(law, dict) or not isinstance(law.get("of"), str):
                 continue

@@ -139,8 +139,8 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None, 
             )
         return _samples(raw, quantity, info)
 
-    others = [name for name in variables if name != "t"]
-    named = f", {', '.join(others[:-1])} and {others[-1]}" if len(others) > 1 else ""
+    other_variables = [name for name in variables if name != "t"]
+    named = f", {', '.join(other_variables[:-1])} and {other_variables[-1]}" if len(other_variables) > 1 else ""
     law = scalar_schema(quantity, f" and of t, the time in s{named}")
     spline = Samples.model_json_schema()
     spline["properties"]["initial"] = {"type": "array", "items": {"anyOf": ANY_VALUE}, "maxItems": MOST}
@@ -155,11 +155,11 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None, 
         segmented_schema(),
         piecewise_schema(law),
     ]
-    if not others:
+    if not other_variables:
         either = {"anyOf": [{"definition": f"{word}_law"} for word in ("length", "angle")]}
         forms.append(object_schema({"output": {"type": "string", "minLength": 1}, "law": either}))
     schema = {"description": law["description"], "anyOf": [*ANY_VALUE, *forms]}
-    words = "_".join([*quantity.split(), "law", *(["of", *others] if others else [])])
+    words = "_".join([*quantity.split(), "law", *(["of", *other_variables] if other_variables else [])])
     return Annotated[Any, Checked(check, defined(words, schema))]
 
 
@@ -177,8 +177,8 @@ def _output_law(raw: dict[str, Any], info: Any, variables: dict[str, Dimension |
     stem, _, label = name.rpartition("_")
     if name not in outputs and not (stem in outputs and label in labels):
         raise problem(no_such("output", name, outputs), "output", value=name)
-    known = outputs.get(name)
-    turning = isinstance(known, dict) and known.get("quantity") == "angle"
+    output = outputs.get(name)
+    turning = isinstance(output, dict) and output.get("quantity") == "angle"
     single: Checked = motion("angle" if turning else "length").__metadata__[0]
     return OutputLaw(name, _below(single, raw["law"], info, "law"))
 

@@ -60,11 +60,11 @@ def leader(raw: dict[str, Any], info: Any) -> str | Expression | None:
     if not isinstance(given, str):
         raise problem("must be the name of a driver, or an expression of t", "of", value=given)
     context = info.context or {}
-    known = context.get("drivers", ())
-    if given in known:
+    names = context.get("drivers", ())
+    if given in names:
         return given
-    if known is context.get("leaders", ...):
-        words = no_such("leader", given, known, "coordinate")
+    if names is context.get("leaders", ...):
+        words = no_such("leader", given, names, "coordinate")
         raise problem(f"must be the name of a driver, a joint, or an output; {words}", "of", value=given)
     if given in context.get("leaders", ()) and given not in context.get("names", ()):
         words = (
@@ -92,9 +92,9 @@ def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion |
         raise problem("must be a list of segments, such as {profile: cycloidal, duration: 1 s, to: 20 mm}", "profile")
     lapse, level = _independent_variable(by, info), order_of(raw)
     segments = [_segment(entry, k, quantity, lapse, level, info) for k, entry in enumerate(entries)]
-    begun = initial_values(raw, level + 1, quantity, lapse, info) if level else []
+    initials = initial_values(raw, level + 1, quantity, lapse, info) if level else []
     if level:
-        initial = begun.pop() if len(begun) > level else 0.0
+        initial = initials.pop() if len(initials) > level else 0.0
     else:
         initial = parse(raw.get("initial", 0.0), quantity, info, "initial").value
     start = parse(raw.get("start", 0.0), lapse, info, "start").value
@@ -103,7 +103,7 @@ def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion |
         raise problem(unknown("way", beyond, BEYOND), "beyond", value=beyond)
     try:
         law: AbstractMotion = SegmentedMotion(segments, initial, start, beyond)
-        return followed_law(IntegratedMotion(law, level, begun, start) if level else law, by)
+        return followed_law(IntegratedMotion(law, level, initials, start) if level else law, by)
     except TrajectoryError as error:
         raise problem(error.message, *_place(error.name), value=UNSET if error.value is None else error.value) from None
 
@@ -271,10 +271,10 @@ def rate(
     """Return a derivative of a driven quantity with respect to the variable of its law, in SI units."""
     value = parse(raw, quantity if order == 0 else "any", info, *at, variables=variables)
     if order and value.dimension:
-        known, lapses = bases(quantity, info), [by] if by in LAPSES else LAPSES
-        if not any(is_rate(value.dimension, known, order, lapse) for lapse in lapses):
+        quantities, lapses = bases(quantity, info), [by] if by in LAPSES else LAPSES
+        if not any(is_rate(value.dimension, quantities, order, lapse) for lapse in lapses):
             per = " or".join(per_power(order, LAPSES[lapse]) for lapse in lapses)
-            raise problem(f"must be {' or '.join(known) or 'a number'}{per}", *at, value=raw)
+            raise problem(f"must be {' or '.join(quantities) or 'a number'}{per}", *at, value=raw)
     return value.value
 
 

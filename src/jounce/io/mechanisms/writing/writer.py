@@ -181,7 +181,7 @@ class _Writer:
 
     def _output(self, name: str, output: Any) -> dict[str, Any]:
         location, kind = f"outputs.{name}", form_of(output)
-        words = [word for word, known in OUTPUTS if known is kind]
+        words = [word for word, output_class in OUTPUTS if output_class is kind]
         if not words:
             raise MechanismError(f"the output {kind.__name__} has no form in a file", name=location)
         holder = output_holder(kind)

@@ -220,8 +220,8 @@ def _substituted(expression: Expression, parameters: Mapping[str, Any]) -> Any:
 
     def value_of(match: re.Match[str]) -> str:
         name = match.group()
-        known = name in parameters and name not in CONSTANTS and name not in FUNCTIONS
-        return f"({float(parameters[name])!r})" if known else name
+        is_parameter = name in parameters and name not in CONSTANTS and name not in FUNCTIONS
+        return f"({float(parameters[name])!r})" if is_parameter else name
 
     text = re.sub(rf"(?<![0-9.]){_WORD.pattern}", value_of, expression.text)
     try:

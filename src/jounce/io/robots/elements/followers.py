@@ -55,8 +55,8 @@ def with_room(
         narrowing = _narrowing(leader, rest)
         for joint in followers:
             suits = joint.name not in bad
-            others = [x for x in narrowing if x is not joint] if suits else []
-            conflicting = [x.name for x in others if not has_room(leader.limits, [joint, x])]
+            other_joints = [x for x in narrowing if x is not joint] if suits else []
+            conflicting = [x.name for x in other_joints if not has_room(leader.limits, [joint, x])]
             if suits and not conflicting:
                 continue
             own, (low, high) = ranges_at_leader(leader.limits, [joint])

@@ -96,7 +96,7 @@ class Element:
         return self._parsed(self.content.strip(), f"<{self.tag}> must hold", count, name, infinite)
 
     def _parsed(self, text: str, words: str, count: int, name: tuple[str, ...], infinite: bool) -> list[float]:
-        what = "a finite number" if count == 1 else f"{count} finite numbers"
+        expected = "a finite number" if count == 1 else f"{count} finite numbers"
         try:
             values = [float(word) for word in text.split()]
         except ValueError:
@@ -106,7 +106,7 @@ class Element:
             most = (
                 f" of at most {LARGEST_NUMBER:g}" if values and all(map(math.isfinite, values)) and not usable else ""
             )
-            raise self.error(f"{words} {what}{most}", *name, value=text)
+            raise self.error(f"{words} {expected}{most}", *name, value=text)
         return values
 
     def check_children(self, known: Iterable[str], *name: str) -> None:

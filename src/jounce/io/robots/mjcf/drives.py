@@ -74,12 +74,12 @@ class Drives:
 
     def compensated(self, body: int) -> float:
         """Return the share of gravity that is compensated for a body."""
-        known = self.passive and not self.model.jnt_actgravcomp.any()
-        return float(self.model.body_gravcomp[body]) if known else 0.0
+        applies = self.passive and not self.model.jnt_actgravcomp.any()
+        return float(self.model.body_gravcomp[body]) if applies else 0.0
 
     def tendons(self, fixed: Mapping[str, float]) -> list[Tendon]:
         """Return the tendons along joints with a spring, damping or friction, unless all their joints are held."""
-        model, made = self.model, []
+        model, tendons = self.model, []
         for k in range(model.ntendon):
             if not along_joints(model, k, self.mujoco):
                 continue
@@ -98,8 +98,8 @@ class Drives:
             }
             if any(given.values()) and not set(weights) <= set(fixed):
                 name = model.tendon(k).name or f"tendon_{k}"
-                made.append(Tendon(name, weights, rest=float(rest[0]), **given))
-        return made
+                tendons.append(Tendon(name, weights, rest=float(rest[0]), **given))
+        return tendons
 
 
 def works(flags: int, part: str, mujoco: Any) -> bool:

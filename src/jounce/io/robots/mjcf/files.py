@@ -123,12 +123,12 @@ class _Copies:
     def _body_count(self, element: Element, depth: int) -> int:
         """Return the number of bodies of an element or the files that it brings, without its children."""
         if element.tag == "attach":
-            others = self._models.get(element.attributes.get("model"), [])
+            attached = self._models.get(element.attributes.get("model"), [])
         elif element.tag == "include":
-            others = self._files.get(_file_of(element), [])
+            attached = self._files.get(_file_of(element), [])
         else:
             return element.tag == "body"
-        return max((self.bodies(other, depth + 1) for other in others), default=0)
+        return max((self.bodies(other, depth + 1) for other in attached), default=0)
 
 
 def _file_of(element: Element) -> str:

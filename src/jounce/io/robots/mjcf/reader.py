@@ -317,8 +317,8 @@ class _Reader:
 
     def _unused(self, name: str) -> str:
         """Return a name that no body, joint or link has."""
-        taken = {*self.bodies, *self.joint_names, *(link.name for link in self.links), *(j.name for j in self.joints)}
-        while name in taken:
+        used = {*self.bodies, *self.joint_names, *(link.name for link in self.links), *(j.name for j in self.joints)}
+        while name in used:
             name += "_"
         return name
 
@@ -366,13 +366,13 @@ class _Reader:
                     value = np.ravel(values).tolist()
                     raise self.error(f"{message}; set it to zero", f"joints.{name}.{field}", value=value)
         pose = {"position": position, "rotation": rotation}
-        for made, at in zip(joints, start[-len(joints) :], strict=True):  # base_x may be the name of another joint
-            end = child if made is joints[-1] else self._unused(made.child)
+        for part, at in zip(joints, start[-len(joints) :], strict=True):  # base_x may be the name of another joint
+            end = child if part is joints[-1] else self._unused(part.child)
             if end != child:
                 self.links.append(Link(end))
-            own = {"name": self._unused(made.name), "parent": parent, "child": end, "start": float(at)}
-            along = {} if made.turning else drives
-            self.joints.append(dataclasses.replace(made, **own, **pose, **along))
+            own = {"name": self._unused(part.name), "parent": parent, "child": end, "start": float(at)}
+            along = {} if part.turning else drives
+            self.joints.append(dataclasses.replace(part, **own, **pose, **along))
             parent, pose = end, {}
         self.couplings += self.drives.ball(name, [joint.name for joint in self.joints[-3:]], drives)
 

@@ -133,9 +133,9 @@ def _axis(
         frame = MODEL
     rotation = frames.of(frame, xyz or axis, *where, "xyz").rotation if frame else pose.rotation
     limit, dynamics = axis.only("limit", *where), axis.only("dynamics", *where)
-    for part, known in ((limit, LIMIT), (dynamics, DYNAMICS)):
+    for part, valid in ((limit, LIMIT), (dynamics, DYNAMICS)):
         if part is not None:
-            check_known(part, known, *where, part.tag)
+            check_known(part, valid, *where, part.tag)
     values = {key: number_of(dynamics, key, *where, "dynamics", default=0.0) for key in DYNAMICS}
     for key, value in values.items():
         if value < 0 and key != "spring_reference":
@@ -168,11 +168,11 @@ def with_named_axes(joint: Element, version: tuple[int, ...]) -> Element:
                 directions = [x for x in parts if x.tag == "xyz"] or [
                     Element("xyz", {}, axis.path, axis.line, pieces=["0 0 1"], faults=axis.faults)
                 ]
-                others = [x for x in parts if x.tag != "xyz"]
+                other_parts = [x for x in parts if x.tag != "xyz"]
                 turned = [
                     dataclasses.replace(x, attributes={**x.attributes, "expressed_in": MODEL}) for x in directions
                 ]
-                parts = [*turned, *others]
+                parts = [*turned, *other_parts]
             axis = dataclasses.replace(axis, children=parts)
         children.append(axis)
     return dataclasses.replace(joint, children=children)

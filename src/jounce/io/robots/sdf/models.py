@@ -233,9 +233,9 @@ class _Models:
         """Return a joint in the newest version: its axes name their frames, and no link has its name."""
         name = joint.attributes.get("name", "")
         if version < (1, 7) and any(link.attributes.get("name") == name for link in model.every("link")):
-            taken = {part.attributes.get("name") for part in model.children}
+            used_names = {part.attributes.get("name") for part in model.children}
             new = f"{name}_joint"
-            while new in taken:
+            while new in used_names:
                 new += "_"
             message = f"a link has the name of this joint, which is called {new}; give it another"
             self.faults.add(RENAMED, name, joint.error(message, "joints", name))

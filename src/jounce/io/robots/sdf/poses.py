@@ -72,12 +72,12 @@ class Frames:
             name = chain[-1]
             if name == WORLD:
                 return name
-            known = self._known(name, element, *where)
-            if known == MODEL:
+            link_name = self._known(name, element, *where)
+            if link_name == MODEL:
                 return self.canonical_link()
-            target = self.elements[known]
+            target = self.elements[link_name]
             if target.tag == "link":
-                return known
+                return link_name
             following = text_of(target, "child", "joints", name) if target.tag == "joint" else _attachment(target)
             self._extend(chain, following, target)
 
@@ -170,11 +170,11 @@ def flag_of(element: Element | None, tag: str, *name: str, default: bool = False
     return word in ("true", "1")
 
 
-def check_known(element: Element, known: Iterable[str], *name: str) -> None:
+def check_known(element: Element, valid: Iterable[str], *name: str) -> None:
     """Record elements that SDF does not have; those of other programs have a prefix, such as ``gz:``."""
     for child in element.children:
-        if child.tag not in known and ":" not in child.tag:
-            child.leave_out_unknown(no_such("element of SDF here", child.tag, known), *name)
+        if child.tag not in valid and ":" not in child.tag:
+            child.leave_out_unknown(no_such("element of SDF here", child.tag, valid), *name)
 
 
 def vector_of(element: Element, *name: str) -> Float[np.ndarray, "3"]:

@@ -222,7 +222,7 @@ class _Reader:
             return self._turns(joint, child)
         if joint.kind == "fixed":
             return [Joint(joint.name, joint.parent, child, "fixed")]
-        made = []
+        joints = []
         for axis in joint.axes:
             last = axis is joint.axes[-1]
             name = self.coordinates.get((joint.name, axis.tag), joint.name)
@@ -231,14 +231,14 @@ class _Reader:
                 self.links.append(Link(end))
             bounded = axis.limits.lower is not None or axis.limits.upper is not None
             kind = "prismatic" if joint.kind == "prismatic" else "revolute" if bounded else "continuous"
-            start = made[-1].child if made else joint.parent
+            start = joints[-1].child if joints else joint.parent
             direction = rotation.T @ axis.direction
             arguments: dict[str, Any] = {"axis": direction, "limits": axis.limits, "mimic": mimics.get(name)}
             arguments |= {field: getattr(axis, field) for field in OF_AXIS}
-            made.append(Joint(name, start, end, kind, **arguments))
+            joints.append(Joint(name, start, end, kind, **arguments))
         if joint.kind == "screw":
-            made = self._screw(joint, made[0], child)
-        return made
+            joints = self._screw(joint, joints[0], child)
+        return joints
 
     def _screw(self, joint: SdfJoint, turn: Joint, child: str) -> list[Joint]:
         """Return the turn of a screw, and the travel along its axis that follows the turn."""

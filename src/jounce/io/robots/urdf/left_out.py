@@ -87,7 +87,7 @@ def rotors(root: Element, faults: Faults) -> dict[str, float]:
     actuators are left out.
     """
     inertias: dict[str, float] = {}
-    known = dict.fromkeys(element.attributes.get("name", "") for element in root.every("joint"))
+    joint_names = dict.fromkeys(element.attributes.get("name", "") for element in root.every("joint"))
     for transmission in root.every("transmission"):
         actuators, joints = transmission.every("actuator"), transmission.every("joint")
         for actuator in actuators:
@@ -106,8 +106,8 @@ def rotors(root: Element, faults: Faults) -> dict[str, float]:
                 faults.leave_out(ROTORS, name, rotor.error(left_out(ROTORS), *where, ROTOR, value=inertia))
                 continue
             joint = joints[0].text("name", *where, "joint")
-            if joint not in known:
-                raise joints[0].error(no_such("joint", joint, known), *where, "joint", value=joint)
+            if joint not in joint_names:
+                raise joints[0].error(no_such("joint", joint, joint_names), *where, "joint", value=joint)
             inertias[joint] = inertias.get(joint, 0.0) + inertia * ratio**2
     return inertias
 

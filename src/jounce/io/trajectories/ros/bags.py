@@ -114,8 +114,10 @@ def _states(reader: Any, connections: list[Any], path: str) -> Recording:
         if len(set(names)) < len(names):
             fault = f"message {number} of {connection.topic} names a joint twice"
             raise TrajectoryError(fault, path=path, name="name", value=names[:10])
-        known = len(levels[1]) == len(names) and bool(np.isfinite(levels[1]).all())
-        states.append(State(Decimal(own.sec) + Decimal(int(own.nanosec)) / NANO, names, levels[: 1 + known], 0))
+        has_velocities = len(levels[1]) == len(names) and bool(np.isfinite(levels[1]).all())
+        states.append(
+            State(Decimal(own.sec) + Decimal(int(own.nanosec)) / NANO, names, levels[: 1 + has_velocities], 0)
+        )
         received.append(Decimal(stamp) / NANO)
     if len(states) < 2:
         raise TrajectoryError("at least two samples are needed", path=path, value=len(states))

@@ -59,9 +59,11 @@ def recorded_states(path: str, states: Sequence[State]) -> Recording:
         for level, numbers in enumerate(state.levels):
             values[k, level, own] = numbers
     first = states[0].stamp
-    known = epoch(first)
-    times = np.array([float(state.stamp - (first if known else 0)) for state in states])
+    epoch_unit = epoch(first)
+    times = np.array([float(state.stamp - (first if epoch_unit else 0)) for state in states])
     moving = ~np.isnan(values[:, 0])
     levels = 2 if (~np.isnan(values[:, 1]) == moving).all() else 1
     lines = [state.line for state in states] if states[0].line else ()
-    return Recording(path, tuple(names), times, values[:, :levels], lines, notes=() if known is None else (known[1],))
+    return Recording(
+        path, tuple(names), times, values[:, :levels], lines, notes=() if epoch_unit is None else (epoch_unit[1],)
+    )
