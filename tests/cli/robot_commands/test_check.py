@@ -217,7 +217,7 @@ BAD_TRAJECTORIES = {
         f"time,pin\n0.1,9\n{LINE}",
         "line 3, pin: times must increase, got 0.1; this one repeats the one before",
     ),
-    "NaN": ("csv", f"time,pin\n0,nan\n{LINE}", "motion.csv, line 2, pin: must be a finite number, got 'nan'"),
+    "infinite": ("csv", f"time,pin\n0,inf\n{LINE}", "motion.csv, line 2, pin: must be a finite number, got 'inf'"),
     "too few samples": ("csv", "time,pin\n0,0\n1,1\n", "a spline of degree 5 needs at least 6 samples, got 2"),
     "empty": ("csv", "", "motion.csv: the file of samples is empty"),
     "a law without a value": ("yaml", HOLD.replace("0.5", "1/t"), "the law is not defined or not smooth at 0 s"),

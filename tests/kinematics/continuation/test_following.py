@@ -125,6 +125,48 @@ def test_dead_center_touched_by_the_law_is_a_change_point():
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], angle, atol=1e-9)
 
 
+@pytest.mark.parametrize("order", [0, 4, 6])
+@pytest.mark.parametrize("instants", [[0, 0.3, 0.5, 0.7], [0, 0.3, 0.45, 0.55, 0.7], np.linspace(0, 1, 11)])
+def test_motion_that_turns_back_at_a_change_point_ends_there(order, instants):
+    """The determinant has a double zero, where rounding would choose the branch: x = 0, or as the crank goes on."""
+    law, time = "pi/2 - 0.5*(t - 0.5)**2", np.array(instants, float)
+    crank_angle = np.pi / 2 - 0.5 * (time - 0.5) ** 2
+    turned = drivers.CoordinateDriver(("ground", "crank"), "angle", motion=law)
+    bodies = {"crank": jn.Body([0, 0], 1.4), "rod": jn.Body([0.17, 0.98], -1.4), "slider": jn.Body([0.34, 0])}
+    joints = {
+        "A": planar.Revolute(("ground", "crank"), [0, 0], [0, 0]),
+        "B": planar.Revolute(("crank", "rod"), [1, 0], [0, 0]),
+        "C": planar.Revolute(("rod", "slider"), [1, 0], [0, 0]),
+        "guide": planar.Prismatic(("ground", "slider"), [0, 0], [0, 0], [1, 0], [1, 0]),
+    }
+    outputs = {"x": jn.outputs.PointOutput("slider", [0, 0])}
+    mechanism = jn.Mechanism(
+        space="planar", bodies=bodies, joints=joints, drivers={"turn": turned}, outputs=outputs, time=time
+    )
+    motion = jn.solve(mechanism, order=order, strict=False)
+    before = time < 0.5
+    np.testing.assert_array_equal(motion.status == Status.OK, before)
+    assert motion.status[~before][0] == Status.SINGULAR
+    np.testing.assert_allclose(motion.outputs["x"][before, 0, 0], 2 * np.cos(crank_angle[before]), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_parallelogram_that_turns_back_where_it_is_flat_ends_there(order):
+    turning = four_bar("0.5", "0.5", "0.5*(t - 0.5)**2", AB=0.05, CD=0.05, AD=0.2, BC=0.2)
+    motion = jn.solve(turning, [0, 0.3, 0.5, 0.7], order=order, strict=False)
+    assert motion.status.tolist() == [Status.OK, Status.OK, Status.SINGULAR, Status.NOT_REACHED]
+    np.testing.assert_allclose(motion.outputs["psi"][:2, :3], [[0.125, -0.5, 1], [0.02, -0.2, 1]], atol=1e-11)
+
+
+@pytest.mark.parametrize("missed", [0.01, 1e-3])
+def test_parallelogram_that_turns_back_before_it_is_flat_goes_on(missed):
+    turning = four_bar("0.5", "0.5", f"{missed} + 0.5*(t - 0.5)**2", AB=0.05, CD=0.05, AD=0.2, BC=0.2)
+    time = np.linspace(0, 1, 21)
+    motion = jn.solve(turning, time, order=2)
+    expected = np.stack([missed + 0.5 * (time - 0.5) ** 2, time - 0.5, np.ones(21)], axis=1)
+    np.testing.assert_allclose(motion.outputs["psi"][:, :3], expected, atol=1e-10)
+
+
 def test_branches_a_little_apart_are_no_change_point():
     """A coupler longer by 1e-9 turns the crossing into a near miss, a gap of 1e-5 rad wide: the rocker turns back."""
     mechanism = four_bar("0.5", "0.5", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2 + 1e-9)

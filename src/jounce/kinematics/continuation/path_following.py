@@ -32,6 +32,8 @@ SMALLEST_STEP = 1e-10  # part of the span
 PASSAGE_ORDER = 4  # of the series through a change point; rounding spoils higher derivatives near it
 PASSAGE_DEVIATION = 1e-8  # relative: two branches separated by a gap g deviate from that series by (g / distance)^2
 NEARLY_SINGULAR = 1e-6  # part of the span: a motion that stops this close to a singular position ends at it
+SIMPLE_ZERO = 1.6  # time between anchors over the loss of reach: 1 toward a simple zero of the determinant, 2 a double
+TOUCHING = 1e-3  # radii: nearer to a multiple zero, positions are as uncertain as the branches are far apart
 LEAST_PASSAGE = 0.2  # part of the distance to a change point by which the motion must continue beyond it
 NEARBY = 0.1  # radii: closer singular positions spoil high derivatives of a smooth motion
 INSTANT = attrgetter("instant")  # of an anchor
@@ -243,7 +245,11 @@ def follow(
         ending = int(control.ending)
         first += int(run.next_up)
         if ending == StopReason.PASSAGE:
-            passed = _far_side(solver, last, stop)
+            touches = _touches(path.anchors)
+            if touches and last.reach < TOUCHING * last.radius:
+                beyond = float(np.nextafter(last.instant, np.inf))
+                return path.ended(Status.SINGULAR, beyond, ", ".join(solver.model.drivers))
+            passed = None if touches else _far_side(solver, last, stop)
             if passed is None:
                 no = np.zeros((), bool)
                 control = control._replace(may_pass=no, ending=np.asarray(int(StopReason.UNFINISHED)))
@@ -276,6 +282,18 @@ def _end_path(solver: Solver, path: FollowedPath, done: TakenSteps, span: float)
     if status != Status.INADMISSIBLE and last.reach < NEARLY_SINGULAR * span:
         status = Status.SINGULAR  # the motion ends at a dead point
     return path.ended(status, target, solver.fault(arrival, 0))
+
+
+def _touches(anchors: Sequence[Anchor]) -> bool:
+    """Return whether the motion nears a multiple zero of the determinant, as where a driver turns back.
+
+    Such a zero is farther away than its rate says: a passage by that rate would end at the zero itself, where rounding
+    chooses the branch.
+    """
+    if len(anchors) < 2:
+        return False
+    before, last = anchors[-2:]
+    return last.instant - before.instant > SIMPLE_ZERO * (before.reach - last.reach)
 
 
 def _far_side(solver: Solver, near_side: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
