@@ -32,7 +32,7 @@ SMALLEST_STEP = 1e-10  # part of the span
 PASSAGE_ORDER = 4  # of the series through a change point; rounding spoils higher derivatives near it
 PASSAGE_DEVIATION = 1e-8  # relative: two branches separated by a gap g deviate from that series by (g / distance)^2
 NEARLY_SINGULAR = 1e-6  # part of the span: a motion that stops this close to a singular position ends at it
-SIMPLE_ZERO = 1.6  # time between anchors over the loss of reach: 1 toward a simple zero of the determinant, 2 a double
+SIMPLE_ZERO = 1.6  # largest estimate of the multiplicity of a simple zero of the determinant
 TOUCHING = 1e-3  # radii: nearer to a multiple zero, positions are as uncertain as the branches are far apart
 LEAST_PASSAGE = 0.2  # part of the distance to a change point by which the motion must continue beyond it
 NEARBY = 0.1  # radii: closer singular positions spoil high derivatives of a smooth motion
@@ -245,11 +245,11 @@ def follow(
         ending = int(control.ending)
         first += int(run.next_up)
         if ending == StopReason.PASSAGE:
-            touches = _touches(path.anchors)
-            if touches and last.reach < TOUCHING * last.radius:
+            multiplicity = _zero_ahead(path.anchors)
+            if multiplicity > SIMPLE_ZERO and last.reach < TOUCHING * last.radius:
                 beyond = float(np.nextafter(last.instant, np.inf))
                 return path.ended(Status.SINGULAR, beyond, ", ".join(solver.model.drivers))
-            passed = None if touches else _far_side(solver, last, stop)
+            passed = _far_side(solver, last, stop) if multiplicity <= SIMPLE_ZERO else None
             if passed is None:
                 no = np.zeros((), bool)
                 control = control._replace(may_pass=no, ending=np.asarray(int(StopReason.UNFINISHED)))
@@ -284,16 +284,17 @@ def _end_path(solver: Solver, path: FollowedPath, done: TakenSteps, span: float)
     return path.ended(status, target, solver.fault(arrival, 0))
 
 
-def _touches(anchors: Sequence[Anchor]) -> bool:
-    """Return whether the motion nears a multiple zero of the determinant, as where a driver turns back.
+def _zero_ahead(anchors: Sequence[Anchor]) -> float:
+    """Return the estimated multiplicity of the zero of the determinant ahead; NaN before two anchors approach it.
 
-    Such a zero is farther away than its rate says: a passage by that rate would end at the zero itself, where rounding
-    chooses the branch.
+    A multiple zero, as where a driver turns back, is farther away than its rate says: a passage by that rate would end
+    at the zero itself, where rounding chooses the branch.
     """
-    if len(anchors) < 2:
-        return False
+    if len(anchors) < 2 or not anchors[-2].det_rate < 0:
+        return np.nan
     before, last = anchors[-2:]
-    return last.instant - before.instant > SIMPLE_ZERO * (before.reach - last.reach)
+    lost = before.reach - last.reach
+    return (last.instant - before.instant) / lost if lost > 0 else np.inf
 
 
 def _far_side(solver: Solver, near_side: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
