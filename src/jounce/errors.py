@@ -309,12 +309,11 @@ class _BoundedWarning(UserWarning):
 
 def warn_caller(warning: Warning) -> None:
     """Issue a warning at the line of the user's program that called this package, at any call depth."""
-    frame, level, caller = sys._getframe(1), 1, 1
+    frame, level, caller = sys._getframe(1), 2, 1
     while frame is not None:
-        level += 1
         if str(frame.f_globals.get("__name__")).partition(".")[0] == "jounce":
             caller = level + 1
-        frame = frame.f_back
+        frame, level = frame.f_back, level + 1
     warnings.warn(warning, stacklevel=caller)
 
 
@@ -332,6 +331,10 @@ class RecordingWarning(_BoundedWarning):
 
 class UnitWarning(_BoundedWarning):
     """A number without a unit is likely not in SI units."""
+
+
+class ReplacedTypeWarning(_BoundedWarning):
+    """A joint, driver or force of a user has a type that mechanism files used for a class of this package."""
 
 
 class AssemblyWarning(_BoundedWarning):
@@ -375,8 +378,7 @@ class SolveError(JounceError):
 
     def __init__(self, message: str, *, motion: Any = None, status: Any = None, **location: Any) -> None:
         super().__init__(message, **location)
-        self.motion = motion
-        self.status = status
+        self.motion, self.status = motion, status
 
 
 class AssemblyError(SolveError):

@@ -1,9 +1,12 @@
-"""A type of joints, drivers or forces is one class: no class replaces another silently."""
+"""A type of joints, drivers or forces names one class: no class replaces another without a word."""
 
+import dataclasses
+
+import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.constraints import catalogue
+from jounce.constraints import base, catalogue
 from jounce.constraints.base import field_kind, value_fields
 from jounce.io.mechanisms.user_classes import import_file
 
@@ -14,29 +17,70 @@ def own(kind="mine", name="Own", body=None, **keywords):
     return jn.joints.AbstractConstraint.__class__(name, (jn.joints.AbstractConstraint,), body, type=kind, **keywords)
 
 
+@pytest.fixture
+def types_as_before():
+    """Give the types that a test takes back to the classes of the library."""
+    before = {key: dict(kinds) for key, kinds in base._REGISTRY.items()}
+    yield
+    for key, kinds in before.items():
+        base._REGISTRY[key] = kinds
+
+
 @pytest.mark.parametrize(
     "kind, space, role",
     [
-        ("revolute", "planar", "joint"),
+        ("rope", "planar", "joint"),
         ("revolute", "spatial", "joint"),
         ("spherical", "", "joint"),
         ("slide", "", "driver"),
     ],
 )
-def test_types_of_the_library_are_taken(kind, space, role):
+def test_types_of_the_library_may_be_taken_with_a_warning(kind, space, role, types_as_before):
     before = {each: catalogue(each, role) for each in ("planar", "spatial")}
-    with pytest.raises(jn.errors.MechanismError, match=rf"jounce\.constraints\..*got '{kind}'"):
-        own(kind, space=space, role=role)
-    assert {each: catalogue(each, role) for each in ("planar", "spatial")} == before
+    with pytest.warns(jn.errors.ReplacedTypeWarning, match=rf"'{kind}' names Own in files now.*jounce\.constraints\."):
+        mine = own(kind, space=space, role=role)
+    for each in ("planar", "spatial"):
+        expected = before[each] | ({kind: mine} if space in ("", each) else {})
+        assert catalogue(each, role) == expected
 
 
-def test_forces_too():
-    with pytest.raises(jn.errors.MechanismError, match=r"jounce\.forces\..*got 'spring'"):
+def test_a_file_with_a_type_that_the_library_took_later_means_the_class_of_the_user(tmp_path, types_as_before):
+    own_joint = tmp_path / "ropes.py"
+    own_joint.write_text(
+        "import jounce as jn\nfrom jounce import jet\n"
+        'class Rope(jn.joints.AbstractConstraint, type="rope", space="planar"):\n'
+        "    point_i: jn.joints.Vector\n    point_j: jn.joints.Vector\n    span: jn.joints.Scalar\n"
+        "    def residual(self, body_i, body_j, time):\n"
+        "        d = body_j.point(self.point_j) - body_i.point(self.point_i)\n"
+        "        return jet.sqrt(d.dot(d)) - self.span\n"
+    )
+    path = tmp_path / "bead.yaml"
+    path.write_text(
+        "space: planar\nbodies: {bead: {position: [3, 4]}}\n"
+        "joints:\n  r: {type: rope, bodies: [ground, bead], points: [[0, 0], [0, 0]], span: 5}\n"
+        "  flat: {type: parallel1, bodies: [ground, bead], vectors: [[1, 0], [1, 0]]}\n"
+        "drivers: {x: {type: coordinate, bodies: [ground, bead], coordinate: x, motion: 3 + t}}\n"
+        "outputs: {p: {body: bead, point: [0, 0]}}\ntime: {start: 0, stop: 1, count: 2}\n"
+    )
+    with pytest.warns(jn.errors.ReplacedTypeWarning, match="'rope'"):
+        import_file(own_joint)
+    mechanism = jn.load(path)
+    np.testing.assert_allclose(jn.solve(mechanism, [1.0], order=0).outputs["p"][0, 0], [4.0, 3.0], atol=1e-12)
+    jn.write_mechanism(mechanism, tmp_path / "again.yaml")
+    assert type(jn.load(tmp_path / "again.yaml").joints["r"]) is type(mechanism.joints["r"])
+    rope = jn.joints.Rope(("ground", "bead"), points=[[0, 0], [0, 0]], length=5.0)
+    other = dataclasses.replace(mechanism, joints={**mechanism.joints, "r": rope})
+    with pytest.raises(jn.errors.MechanismError, match="type 'rope' names another class, Rope of jounce_own"):
+        jn.write_mechanism(other, tmp_path / "other.yaml")
+
+
+def test_types_of_forces_too(types_as_before):
+    with pytest.warns(jn.errors.ReplacedTypeWarning, match=r"'spring'.*jounce\.forces\."):
 
         class Spring(jn.forces.AbstractForce, type="spring", space="planar"):
             pass
 
-    assert catalogue("planar", "force")["spring"] is jn.forces.Spring
+    assert catalogue("planar", "force")["spring"] is Spring
 
 
 def test_a_class_defined_again_takes_its_own_place():

@@ -20,7 +20,7 @@ from jounce.constraints.facts import (
     field_kinds as field_kinds,
     value_fields as value_fields,
 )
-from jounce.errors import MechanismError, check_choice
+from jounce.errors import MechanismError, ReplacedTypeWarning, check_choice, warn_caller
 from jounce.jet import Jet, concatenate
 
 Scalar = Annotated[Any, "scalar"]
@@ -46,9 +46,15 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
     Raises
     ------
     MechanismError
-        If another class has this type, as files would silently get the new one; or if a field has a name that files
-        reserve. A class defined again, as in a notebook cell that is run again, replaces its former definition once it
-        is complete; classes of this package cannot be replaced.
+        If another class of a user has this type, as files would silently get the new one; or if a field has a name that
+        files reserve. A class defined again, as in a notebook cell that is run again, replaces its former definition
+        once it is complete.
+
+    Warns
+    -----
+    ReplacedTypeWarning
+        If a class of this package has this type: files name the new class by it from then on, so that programs written
+        before the package had this type work as before.
     """
     check_choice("role", role, ROLES, MechanismError)
     if space:
@@ -62,11 +68,15 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
     catalogues = [_REGISTRY.setdefault((each, role), {}) for each in ((space,) if space else SPACES)]
     for taken in catalogues:
         other = _last_whole(taken.get(type, ()))
-        if other is not None and (_belongs_to_package(other) or _full_name(other) != _full_name(kind)):
-            message = (
-                f"the {role} type of {kind.__qualname__} is that of {other.__module__}.{other.__qualname__} already"
-            )
-            raise MechanismError(f"{message}; give it another one", name="type", value=type)
+        ours = other is not None and _belongs_to_package(other)
+        if other is None or (not ours and _full_name(other) == _full_name(kind)):
+            continue
+        name = f"{other.__module__}.{other.__qualname__}"
+        if not ours or _belongs_to_package(kind):
+            message = f"the {role} type of {kind.__qualname__} is that of {name} already; give it another one"
+            raise MechanismError(message, name="type", value=type)
+        message = f"type {type!r} names {kind.__qualname__} in files now, no longer {name}; another type keeps both"
+        warn_caller(ReplacedTypeWarning(message))
     kind.type_name, kind.space, kind.role = type, space, role
     for free in catalogues:
         before = _last_whole(free.get(type, ()))

@@ -159,8 +159,12 @@ class _Writer:
         if isinstance(element, Cam):
             return self._cam(f"{section}.{name}", element)
         location, kind = f"{section}.{name}", type(element)
-        if catalogue(self.mechanism.space, ROLES[section]).get(kind.type_name) is not kind:
+        named = catalogue(self.mechanism.space, ROLES[section]).get(kind.type_name)
+        if named is not kind:
             message = f"the class {kind.__name__} has no type by which a file could name it"
+            if named is not None:
+                other = f"{named.__qualname__} of {named.__module__}"
+                message = f"the type {kind.type_name!r} names another class, {other}; give that one another type"
             raise MechanismError(message, name=location)
         entries: dict[str, Any] = {"type": kind.type_name}
         single = kind.body_count == 1
