@@ -199,9 +199,65 @@ def test_retiming_keeps_them():
         jn.retime(beyond, path)
 
 
-def test_inverse_kinematics_does_not_ignore_them():
+def level_foot(**limits):
+    """Return two links of 0.5 and 0.4 m in a plane, and a foot that stays level, as it turns by less the angles."""
+    links = [jn.Link("base"), *(jn.Link(name, jn.Inertia(1.0, [0.1, 0, 0], [0.01] * 3)) for name in "abc")]
+    joints = [
+        jn.Joint("p", "base", "a"),
+        jn.Joint("q", "a", "b", position=[0.5, 0, 0]),
+        jn.Joint("r", "b", "c", position=[0.4, 0, 0], mimic=Mimic(["p", "q"], -1.0), limits=jn.Limits(**limits)),
+    ]
+    return jn.Robot("leg", links, joints)
+
+
+def elbows(x, y):
+    """Return both solutions (p, q) for the foot of the level leg, by trigonometry."""
+    knee = np.arccos((x**2 + y**2 - 0.5**2 - 0.4**2) / (2 * 0.5 * 0.4))
+    return [
+        (np.arctan2(y, x) - np.arctan2(0.4 * np.sin(q), 0.5 + 0.4 * np.cos(q)), q) for q in (float(knee), -float(knee))
+    ]
+
+
+def test_inverse_kinematics_finds_the_solution_within_their_ranges():
+    """The range of the foot admits one of both solutions, whichever the start is near to."""
+    goals = np.stack([np.linspace(0.3, 0.7, 9), np.linspace(0.4, -0.2, 9), np.zeros(9)], axis=1)
+    both = np.array([elbows(x, y) for x, y, _ in goals])
+    ankles = -both.sum(axis=2)
+    bound = ankles.mean(axis=1)
+    assert (ankles[:, 0] < bound).all()
+    for k, goal in enumerate(goals):
+        for chosen, limits in enumerate(({"upper": bound[k]}, {"lower": bound[k]})):
+            robot = level_foot(**limits)
+            found = jn.inverse_kinematics(robot, "c", goal, start=both[k, 1 - chosen])
+            np.testing.assert_allclose(found.q, both[k, chosen], rtol=0, atol=1e-9)
+    wrong = jn.inverse_kinematics(level_foot(upper=bound[0]), "c", goals[0], start=both[0, 1], limits=False)
+    np.testing.assert_allclose(wrong.q, both[0, 1], rtol=0, atol=1e-9)
+
+
+def test_inverse_kinematics_stops_at_their_ranges():
+    """The last slide ends at 0.6 m, and the first ones have ranges of their own."""
     robot = gantry(limits=jn.Limits(**LIMITED))
-    with pytest.raises(RobotError, match=r"joints\.z\.limits: the range of a joint that follows several"):
-        jn.inverse_kinematics(robot, "c", [0.3, 0, 0])
-    found = jn.inverse_kinematics(robot, "c", [0.3, 0, 0], limits=False)
-    np.testing.assert_allclose(found.q @ [-1, 2], 0.2, atol=1e-9)
+    found = jn.inverse_kinematics(robot, "c", [[0.3, 0, 0], [0.6, 0, 0], [0.9, 0, 0]])
+    np.testing.assert_allclose(found.q[:2] @ [-1, 2] + 0.1, [0.3, 0.6], atol=1e-9)
+    assert found.status[2] == jn.kinematics.Status.NOT_ASSEMBLED
+    np.testing.assert_allclose(found.distance[2], 0.3, rtol=1e-4)
+    assert found.limited_names == ("x", "y", "z")
+    assert found.limited[2].tolist() == [False, False, True]
+    assert found.explain(2).endswith("at their limits: z")
+
+
+def test_tool_paths_name_the_follower_that_leaves_its_range():
+    """The foot goes along a line; its angle is that of trigonometry, and passes 0.2 rad on the way."""
+    path = jn.planning.ToolPath(["0.4 + 0.3*t", 0.2, 0.0], start=0.0, stop=1.0)
+    start = np.array(elbows(0.4, 0.2)[0])
+    times = np.linspace(0, 1, 21)
+    ankle = -np.array([elbows(0.4 + 0.3 * t, 0.2)[0] for t in times]).sum(axis=1)
+    bound = float(ankle[9:11].mean())
+    limits = {"upper" if ankle[-1] > ankle[0] else "lower": bound}
+    motion = jn.planning.follow_tool_path(level_foot(**limits), "c", path, times, start=start, strict=False)
+    assert (motion.status == jn.kinematics.Status.INADMISSIBLE).tolist() == [False] * 10 + [True] * 11
+    assert motion.explain(10).startswith(f"r leaves its range at t = 0.5 s, where it is {ankle[10]:.6g};")
+    with pytest.raises(RobotError, match=r"c: r leaves its range at t = 0\.5 s"):
+        jn.planning.follow_tool_path(level_foot(**limits), "c", path, times, start=start)
+    free = jn.planning.follow_tool_path(level_foot(**limits), "c", path, times, start=start, limits=False)
+    np.testing.assert_allclose(-free.q[:, 0].sum(axis=1), ankle, rtol=0, atol=1e-9)

@@ -49,6 +49,13 @@ class SharedFollowers:
         """Their limits: of what drives them the joints that they follow have."""
         return {joint.name: joint.limits for joint in self.joints}
 
+    @property
+    def ranges(self) -> tuple[Float[np.ndarray, " follower"], Float[np.ndarray, " follower"]]:
+        """Their ranges, infinite without limits."""
+        lower = [-np.inf if joint.limits.lower is None else joint.limits.lower for joint in self.joints]
+        upper = [np.inf if joint.limits.upper is None else joint.limits.upper for joint in self.joints]
+        return np.array(lower, float), np.array(upper, float)
+
     def moving(self, columns: list[int]) -> list[int]:
         """Return which of them move where some coordinates do."""
         return [k for k, row in enumerate(self.weights) if row[columns].any()]

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 
 from jounce.base.shapes import ArrayLike
+from jounce.dynamics.limits.shared_followers import SharedFollowers
 from jounce.errors import JounceError, RobotError, SingularityError, check_name
 from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics import Status
 from jounce.planning.tool_paths.inverse_kinematics import (
-    check_shared_ranges,
     coordinate_scale,
+    follower_ranges,
     joint_ranges,
     middle,
     poses_within,
@@ -112,9 +113,7 @@ def follow_tool_path(
         raise RobotError("must be a jn.planning.ToolPath", name="path", value=type(path).__name__)
     tool, n = tool_of(robot, link, point, axis), len(robot.joint_names)
     scale = coordinate_scale(robot, tool)
-    if limits:
-        check_shared_ranges(robot)
-    ranges = joint_ranges(robot)
+    ranges, followers = joint_ranges(robot), SharedFollowers.of(robot)
     laws = _fixed_joint_laws(robot, hold, path)
     fixed_joints = tuple(robot.joint_names.index(name) for name in laws.names) if laws else ()
     given = _numbers(robot, "posture", posture)
@@ -145,12 +144,13 @@ def follow_tool_path(
             goal["posture"] = states
         return goal
 
-    begin = _start(robot, tool, path, ranges if limits else None, laws, start, scale, kinds, link)
+    ends = tuple(np.concatenate(x) for x in zip(ranges, followers.ranges, strict=True)) if limits else None
+    begin = _start(robot, tool, path, ends, laws, start, scale, kinds, link)
     u = np.concatenate([begin / scale, np.zeros(equations.size - n)])
     if equations.has_posture:
         u = _to_posture(equations, u, target, path.start, link)
     nodes = followed(equations, u, target, path.start, path.stop, path.highest)
-    motion = ToolPathMotion(robot, link, path, equations, nodes, target, whole, ranges if limits else None, time, order)
+    motion = ToolPathMotion(robot, link, path, equations, nodes, target, whole, ends, time, order)
     if strict:
         _raise_for(motion, nodes)
     return motion
@@ -161,7 +161,7 @@ def _start(
 ) -> np.ndarray:
     """Return coordinates of the tool at the beginning of the path."""
     n = len(robot.joint_names)
-    lower, upper = (np.full(n, -np.inf), np.full(n, np.inf)) if ranges is None else (x.copy() for x in ranges)
+    lower, upper = (np.full(n, -np.inf), np.full(n, np.inf)) if ranges is None else (x[:n].copy() for x in ranges)
     if laws:
         for name, value in zip(laws.names, laws.derivatives([path.start], 0)[0, 0], strict=True):
             k = robot.joint_names.index(name)
@@ -169,9 +169,9 @@ def _start(
     near = _numbers(robot, "start", start)
     goal = {kind: np.moveaxis(x[0], -1, 0) for kind, x in path.series(np.array([path.start]), 0).items()}
     guess = middle(*joint_ranges(robot)) if near is None else near
-    result = poses_within(
-        robot, tool, {kind: goal[kind] for kind in kinds}, (lower, upper, scale), guess[None], 8 if near is None else 1
-    )
+    goals, starts = {kind: goal[kind] for kind in kinds}, 8 if near is None else 1
+    shared = follower_ranges(robot, tool, limits=ranges is not None)
+    result = poses_within(robot, tool, goals, (lower, upper, scale), shared, guess[None], starts)
     if not result[1][0] <= REACHED**2:
         missed = float(np.sqrt(result[1][0]))
         message = (

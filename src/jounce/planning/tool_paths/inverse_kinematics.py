@@ -6,10 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.shapes import ArrayLike, by_component
+from jounce.dynamics.limits.shared_followers import SharedFollowers
 from jounce.errors import RobotError
 from jounce.kinematics import Status
 from jounce.planning.tool_paths.joint_poses import JointPoses
-from jounce.planning.tool_paths.pose_solver import solve_poses
+from jounce.planning.tool_paths.pose_solver import FollowerRanges, solve_poses
 from jounce.planning.tool_paths.task_rank import (
     CONFIGURATIONS,
     SINGULAR,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 STATIONARY = 1e-5  # relative slope of the error at a stationary point
 WIDTHS = {"position": (3,), "rotation": (3, 3), "direction": (3,)}
 SOON = 16  # steps that reach most poses; the others continue with twice as many, and so on
+NEAR = 1e-9  # rad, or sizes of the robot: distance from a limit at which a joint is reported as limited
 FINER = 1e-3  # fraction of the tolerance at which steps end
 
 
@@ -109,8 +111,6 @@ def inverse_kinematics(
     """
     tool = tool_of(robot, link, point, axis)
     goal, lead = _checked_goal(position, orientation, direction)
-    if limits:
-        check_shared_ranges(robot)
     lower, upper = joint_ranges(robot) if limits else (np.full(len(robot.joint_names), x) for x in (-np.inf, np.inf))
     begin = middle(lower, upper) if start is None else np.asarray(checked_position(robot, start, "start"))[..., 0, :]
     if not np.isfinite(begin).all():
@@ -130,11 +130,12 @@ def inverse_kinematics(
         raise RobotError("there is no pose to reach; give at least one", value=f"shape {lead}")
     begin = np.broadcast_to(begin, (*lead, n)).reshape(count, n)
     goal = {kind: np.broadcast_to(x, (*lead, *WIDTHS[kind])).reshape(count, *WIDTHS[kind]) for kind, x in goal.items()}
-    result = poses_within(robot, tool, goal, (lower, upper, scale), begin, starts, within, most_steps, seed)
+    shared = follower_ranges(robot, tool, limits)
+    result = poses_within(robot, tool, goal, (lower, upper, scale), shared, begin, starts, within, most_steps, seed)
     anywhere = random_coordinates(lower, upper, scale, CONFIGURATIONS, seed)
     basis = task_columns(robot, tool, anywhere, tuple(goal), scale)
     return _result(
-        robot, link, point, result, goal, lead, within, (lower, upper, scale), reachable_rows(basis)[1], tool
+        robot, link, point, result, goal, lead, within, (lower, upper, scale), shared, reachable_rows(basis)[1], tool
     )
 
 
@@ -143,6 +144,7 @@ def poses_within(
     tool: Tool,
     goal: dict[str, Any],
     ranges: tuple[Any, Any, Any],
+    shared: FollowerRanges,
     begin: Float[np.ndarray, "count n"],
     starts: int = 8,
     within: float = 1e-10,
@@ -151,7 +153,7 @@ def poses_within(
 ) -> list[np.ndarray]:
     """Return the results of `solve_poses` within ranges of the coordinates, from the first start or further starts."""
     lower, upper, scale = ranges
-    constants = (tool, lower / scale, upper / scale, scale, np.float64(within * FINER))
+    constants = (tool, lower / scale, upper / scale, scale, shared, np.float64(within * FINER))
 
     def solved(begin: np.ndarray, chosen: Any) -> list[np.ndarray]:
         targets = [x[chosen] for x in goal.values()]
@@ -195,6 +197,7 @@ def _result(
     lead: Any,
     within: float,
     ranges: Any,
+    shared: FollowerRanges,
     rank: int,
     tool: Tool,
 ) -> JointPoses:
@@ -205,14 +208,23 @@ def _result(
     distance, angle = _away(robot, link, point, q, goal, tool)
     values, shares = values[:, :rank], shares[:, max(rank - 1, 0)]
     singular = values[:, -1] <= SINGULAR * values[:, 0] if rank else np.ones(len(q), bool)
-    near = 1e-9 * scale
-    limited = (q <= lower + near) | (q >= upper - near)
+    x = q / scale
+    place = x @ shared.weights.T + shared.offset
+    limited = np.concatenate(
+        [_at_ends(x, lower / scale, upper / scale), _at_ends(place, shared.lower, shared.upper)], 1
+    )
     given = np.where((status == Status.OK)[:, None], q, np.nan)
     parts = (given, status, q, distance, angle, singular, values, shares)
     shaped = [x.reshape((*lead, *x.shape[1:])) for x in parts]
     names = ("q", "status", "closest", "distance", "angle", "singular", "singular_values", "shares")
     solved = dict(zip(names, shaped, strict=True))
-    return JointPoses(**solved, joint_names=robot.joint_names, limited=limited.reshape((*lead, -1)))
+    limited_names = (*robot.joint_names, *(SharedFollowers.of(robot).names if len(shared.offset) else ()))
+    limited = limited.reshape((*lead, len(limited_names)))
+    return JointPoses(**solved, joint_names=robot.joint_names, limited=limited, limited_names=limited_names)
+
+
+def _at_ends(x: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    return (x <= lower + NEAR) | (x >= upper - NEAR)
 
 
 def _away(robot: Robot, link: str, point: Any, q: Any, goal: Any, tool: Tool) -> tuple[Any, Any]:
@@ -253,13 +265,14 @@ def _checked_goal(position: Any, orientation: Any, direction: Any) -> tuple[dict
         raise RobotError(message, name="orientation") from None
 
 
-def check_shared_ranges(robot: AbstractRobot) -> None:
-    """Raise RobotError if a joint that follows several has a range, for which no ranges of these stand."""
-    for joint in robot.moving_joints:
-        ends = [joint.limits.lower, joint.limits.upper]
-        if joint.mimic is not None and joint.mimic.several and ends != [None, None]:
-            message = "the range of a joint that follows several cannot be kept here; remove it, or set limits=False"
-            raise RobotError(message, name=f"joints.{joint.name}.limits", value=ends)
+def follower_ranges(robot: Robot, tool: Tool, limits: bool = True) -> FollowerRanges:
+    """Return the ranges of joints that follow several, in scaled coordinates; of none without `limits`."""
+    followers = SharedFollowers.of(robot)
+    turning = np.array([joint.turning for joint in followers.joints], bool)
+    own, (lower, upper) = np.where(turning, 1.0, float(tool.length)), followers.ranges
+    weights = followers.weights * coordinate_scale(robot, tool) / own[:, None]
+    ranges = FollowerRanges(weights, followers.offset / own, lower / own, upper / own)
+    return ranges if limits else FollowerRanges(*(x[:0] for x in ranges))
 
 
 def joint_ranges(robot: AbstractRobot) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:

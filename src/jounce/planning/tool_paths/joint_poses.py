@@ -24,7 +24,8 @@ class JointPoses(Displayed):
         A `Status` for each pose: OK; NOT_ASSEMBLED if `closest` is a local minimum of the error; NOT_CONVERGED if the
         steps ended before a minimum was certain.
     closest : numpy.ndarray of shape (..., n)
-        Coordinates nearest to the pose that were found; those of `q` for a reached pose.
+        Coordinates nearest to the pose that were found; those of `q` for a reached pose. Where it is not reached,
+        joints that follow several may be beyond their ranges by a ten-thousandth of the error that is left.
     distance, angle : numpy.ndarray of shape (...)
         Distance, m, and angle, rad, between tool and pose at `closest`.
     singular : numpy.ndarray of bool, shape (...)
@@ -35,8 +36,10 @@ class JointPoses(Displayed):
         Right singular vector of the least singular value: the joint motion that moves the tool least.
     joint_names : tuple of str
         Names of the joints, in the order of q.
-    limited : numpy.ndarray of bool, shape (..., n)
-        Whether each joint is at a limit at `closest`.
+    limited : numpy.ndarray of bool, shape (..., m)
+        Whether each joint of `limited_names` is at a limit at `closest`.
+    limited_names : tuple of str
+        The joints, and behind them those with limits that follow several.
     """
 
     q: Array[np.ndarray, "*batch n"]
@@ -48,7 +51,8 @@ class JointPoses(Displayed):
     singular_values: Array[np.ndarray, "*batch rank"]
     shares: Array[np.ndarray, "*batch n"]
     joint_names: tuple[str, ...]
-    limited: Bool[np.ndarray, "*batch n"]
+    limited: Bool[np.ndarray, "*batch m"]
+    limited_names: tuple[str, ...]
 
     def __repr__(self) -> str:
         solved = int((self.status == Status.OK).sum())
@@ -72,7 +76,7 @@ class JointPoses(Displayed):
                 words.append(f"not converged: {gap}; allow more steps, or give another start")
             else:
                 words.append(f"not reached: {gap}, and nothing near it is nearer; move the pose, or try more starts")
-            limiting = [name for name, at in zip(self.joint_names, self.limited[lane], strict=True) if at]
+            limiting = [name for name, at in zip(self.limited_names, self.limited[lane], strict=True) if at]
             if limiting:
                 words.append(f"at their limits: {', '.join(limiting)}")
         if self.singular[lane]:

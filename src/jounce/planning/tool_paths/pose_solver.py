@@ -17,6 +17,21 @@ GROWTH = 4.0
 STALLED = 1e-15  # rad: smallest step
 FLAT = 1e-8  # relative slope of the error at a minimum
 STIFF = 1e12  # damping beyond which no step is worth trying
+FIRM = 100.0  # weight of the excess of a follower over its range, relative to errors of the tool
+
+
+class FollowerRanges(NamedTuple):
+    """Ranges of joints that follow several, in scaled coordinates: they follow at ``weights @ x + offset``."""
+
+    weights: Any
+    offset: Any
+    lower: Any
+    upper: Any
+
+    def excess(self, x: Any) -> Any:
+        """Return by how much they are beyond their ranges, (follower, batch)."""
+        place = jnp.sum(self.weights[:, :, None] * x[None], axis=1) + self.offset[:, None]
+        return place - jnp.clip(place, self.lower[:, None], self.upper[:, None])
 
 
 class _Look(NamedTuple):
@@ -33,13 +48,14 @@ def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tupl
     """Return coordinates nearest to a goal, the remaining error, and the singular values of the task.
 
     Projected Levenberg-Marquardt (Kanzow, Yamashita and Fukushima 2004): joints pushed outward at a limit are held, and
-    the others take the damped step, clipped at the limits, if it brings the tool nearer.
+    the others take the damped step, clipped at the limits, if it brings the tool nearer. What a joint that follows
+    several is beyond its range counts as an error: it vanishes where a pose is reached.
 
     Returns
     -------
     q : array of shape (1, coordinates, batch)
     square : array of shape (1, batch)
-        Sum of squared errors, in rad or sizes of the robot.
+        Sum of squared errors, in rad or sizes of the robot, and of the excess of followers over their ranges.
     level : array of shape (1, batch)
         Relative slope of this sum; small at a local minimum.
     active : array of shape (1, batch)
@@ -48,12 +64,12 @@ def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tupl
         Singular values of the task, and its right singular vectors.
     """
     start, *targets = arrays
-    tool, lower, upper, scale, enough, most = constants
+    tool, lower, upper, scale, followers, enough, most = constants
     goal: Goal = dict(zip(kinds, targets, strict=True))
     lower, upper, scale = (jnp.asarray(x)[:, None] for x in (lower, upper, scale))
 
     def missed(x: Any) -> Any:
-        return misses(tree, tool, x * scale, goal)
+        return jnp.concatenate([misses(tree, tool, x * scale, goal), FIRM * followers.excess(x)])
 
     def evaluated(x: Any) -> _Look:
         rows = missed(x)
@@ -97,7 +113,7 @@ def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tupl
     begin = nothing, x, jnp.full(x.shape[1:], FIRST), jnp.full(x.shape[1:], True), jnp.zeros((), int)
     state = jax.lax.while_loop(lambda carry: jnp.any(carry[3]) & (carry[4] <= most), improved, begin)
     best, active = state[0], state[3]
-    _, values, shares = singular_values(best.columns)
+    _, values, shares = singular_values(best.columns[: rows[0] - len(followers.offset)])
     last = (
         best.x * scale,
         best.square,

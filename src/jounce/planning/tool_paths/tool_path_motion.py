@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 
 from jounce.base.display import Displayed
 from jounce.base.shapes import ArrayLike, seconds
+from jounce.dynamics.limits.shared_followers import SharedFollowers
 from jounce.errors import TrajectoryError
 from jounce.execution.chunks import in_chunks
 from jounce.jet.derivatives import plain_derivatives
@@ -133,8 +134,11 @@ class ToolPathMotion(Displayed):
         equations, nodes, _, _, ranges = self._parts
         status = np.full(len(self.time), int(Status.OK))
         if ranges is not None:
-            slack = LIMIT * equations.scale
-            self._outside = (self.q[:, 0] < ranges[0] - slack) | (self.q[:, 0] > ranges[1] + slack)
+            followers = SharedFollowers.of(self.robot)
+            sizes = [1.0 if joint.turning else float(equations.tool.length) for joint in followers.joints]
+            slack = LIMIT * np.concatenate([equations.scale, sizes])
+            self._places = followers.with_followers(self.q[:, :1])[:, 0]
+            self._outside = (self._places < ranges[0] - slack) | (self._places > ranges[1] + slack)
             status[self._outside.any(axis=1)] = int(Status.INADMISSIBLE)
         sizes = [
             np.abs(_by_instant(series[kind])).reshape(len(self.time), self.order + 1, -1) for kind in equations.kinds
@@ -203,9 +207,10 @@ class ToolPathMotion(Displayed):
             words.append(f"not converged at t = {time:.6g} s")
         if status == Status.INADMISSIBLE:
             k = int(np.argmax(self._outside[index]))
+            name = (*self.robot.joint_names, *SharedFollowers.of(self.robot).names)[k]
             words.append(
-                f"{self.robot.joint_names[k]} leaves its range at t = {time:.6g} s, where it is "
-                f"{self.q[index, 0, k]:.6g}; choose another start, posture or path, or limits=False"
+                f"{name} leaves its range at t = {time:.6g} s, where it is {self._places[index, k]:.6g}; choose "
+                "another start, posture or path, or limits=False"
             )
         if self.singular[index]:
             lost = ", ".join(losing_joints(self.robot.joint_names, self._shares[index]))
