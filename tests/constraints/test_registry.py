@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.constraints import base, catalogue
+from jounce.constraints import catalogue
 from jounce.constraints.base import field_kind, value_fields
 from jounce.io.mechanisms.user_classes import import_file
 
@@ -15,15 +15,6 @@ def own(kind="mine", name="Own", body=None, **keywords):
     """Define a class as if in a module, with additional lines in its body."""
     body = {"residual": lambda self, *_: None, "__qualname__": name, "__module__": "notebook"} | (body or {})
     return jn.joints.AbstractConstraint.__class__(name, (jn.joints.AbstractConstraint,), body, type=kind, **keywords)
-
-
-@pytest.fixture
-def types_as_before():
-    """Give the types that a test takes back to the classes of the library."""
-    before = {key: dict(kinds) for key, kinds in base._REGISTRY.items()}
-    yield
-    for key, kinds in before.items():
-        base._REGISTRY[key] = kinds
 
 
 @pytest.mark.parametrize(
@@ -35,7 +26,7 @@ def types_as_before():
         ("slide", "", "driver"),
     ],
 )
-def test_types_of_the_library_may_be_taken_with_a_warning(kind, space, role, types_as_before):
+def test_types_of_the_library_may_be_taken_with_a_warning(kind, space, role):
     before = {each: catalogue(each, role) for each in ("planar", "spatial")}
     with pytest.warns(jn.errors.ReplacedTypeWarning, match=rf"'{kind}' names Own in files now.*jounce\.constraints\."):
         mine = own(kind, space=space, role=role)
@@ -44,7 +35,7 @@ def test_types_of_the_library_may_be_taken_with_a_warning(kind, space, role, typ
         assert catalogue(each, role) == expected
 
 
-def test_a_file_with_a_type_that_the_library_took_later_means_the_class_of_the_user(tmp_path, types_as_before):
+def test_a_file_with_a_type_that_the_library_took_later_means_the_class_of_the_user(tmp_path):
     own_joint = tmp_path / "ropes.py"
     own_joint.write_text(
         "import jounce as jn\nfrom jounce import jet\n"
@@ -74,7 +65,7 @@ def test_a_file_with_a_type_that_the_library_took_later_means_the_class_of_the_u
         jn.write_mechanism(other, tmp_path / "other.yaml")
 
 
-def test_types_of_forces_too(types_as_before):
+def test_types_of_forces_too():
     with pytest.warns(jn.errors.ReplacedTypeWarning, match=r"'spring'.*jounce\.forces\."):
 
         class Spring(jn.forces.AbstractForce, type="spring", space="planar"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from jounce.dynamics.limits.limit_report import LimitReport
+from jounce.reporting.text.numbers import time_text
 
 STILL = 1e-6  # m/s: lower speeds count as zero, as instants and rows of files have about six digits
 
@@ -16,7 +17,7 @@ def load_words(report: LimitReport) -> list[str]:
     for change in report.loads:
         masses = " and ".join(f"{name} by {mass:+.6g} kg" for name, mass in change.masses.items())
         moves = f"moving at {change.speed:.3g} m/s" if change.speed > STILL else "at rest"
-        line = f"load: {masses} at t = {change.time:.6g} s, {moves}"
+        line = f"load: {masses} at t = {time_text(change.time)} s, {moves}"
         if change.steps:
             name = max(change.steps, key=lambda name: abs(change.steps[name]))
             step = f"{change.steps[name]:.3g} {units.get(name, 'N m')}"

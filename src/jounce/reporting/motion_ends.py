@@ -11,6 +11,7 @@ from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.planning.paths.sampled_paths import lines_of
 from jounce.planning.paths.straight_lines import polynomials_at
 from jounce.planning.smoothing.smooth import SmoothedTrajectory, sampled
+from jounce.reporting.text.numbers import time_text
 from jounce.trajectory import HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 
 WITH_VELOCITIES = 5  # degree of splines through positions and velocities
@@ -25,7 +26,7 @@ def ends_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
     sentences = list(ends)
     if all(end.at_rest for end in sentences):
         return ["starts and stops at rest"] if sentences else []
-    return [f"{end.end}s {_moving(end)} at t = {end.time:g} s" for end in sentences]
+    return [f"{end.end}s {_moving(end)} at t = {time_text(end.time)} s" for end in sentences]
 
 
 def _moving(end: TrajectoryEnd) -> str:
@@ -122,5 +123,5 @@ def between_words(trajectory: JointTrajectory) -> list[str]:
         return []
     if facts["deviation"] <= NEGLIGIBLE:
         return [facts["words"]]
-    location = f"{facts['joint']} at t = {facts['at']:.5g} s"
+    location = f"{facts['joint']} at t = {time_text(facts['at'], 5)} s"
     return [f"{facts['words']}, at most {facts['deviation']:.2g} rad or m from straight lines, {location}"]

@@ -25,6 +25,7 @@ from jounce.reporting.facts.modes_facts import equilibrium_facts, equilibrium_ta
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.facts.robot_facts import robot_facts
 from jounce.reporting.peaks import peaks, shown_peaks, table_peaks
+from jounce.reporting.text.numbers import time_text
 from jounce.reporting.text.summaries import count, robot_motion_words, verdict
 from jounce.reporting.text.tables import Table, limits_table, mechanism_tables, number, peaks_table, robot_tables, table
 from jounce.robot import Robot
@@ -161,13 +162,13 @@ def _motion(motion: Motion) -> list[str]:
     facts = motion_facts(motion)
     time = facts["time"]
     solved = f"{time['solved']} of {count(time['count'], 'instant')} solved"
-    line = f"{solved}, t = {time['start']:g} s to {time['stop']:g} s, order {facts['order']}"
+    line = f"{solved}, t = {time_text(time['start'])} s to {time_text(time['stop'])} s, order {facts['order']}"
     lines = _title(facts["title"] or "Motion", line)
     if facts["failures"]:
         first = facts["failures"][0]
         fault = f" ({first['fault']})" if first["fault"] else ""
         word = first["status"].lower().replace("_", " ")
-        text = _text(f"t = {first['time']:g} s: {word}{fault}")
+        text = _text(f"t = {time_text(first['time'])} s: {word}{fault}")
         lines.append(f'<p class="bad">{text}</p>')
     if "steps" in facts:
         text = [facts["mobility"], count(facts["steps"], "step")]
@@ -189,7 +190,7 @@ def _equilibrium(rest: Equilibrium) -> list[str]:
 
 def _linearization(small: Linearization) -> list[str]:
     where = "a motion" if small.equilibrium is None else f"an equilibrium that is {small.equilibrium.stability}"
-    title = _title(small.mechanism.title or "Small motions", f"about {where} at t = {small.time:g} s")
+    title = _title(small.mechanism.title or "Small motions", f"about {where} at t = {time_text(small.time)} s")
     tables = []
     for name, matrix in (("Mass", small.mass), ("Damping", small.damping), ("Stiffness", small.stiffness)):
         rows = [[c, *map(number, row)] for c, row in zip(small.coordinates, matrix.tolist(), strict=True)]
@@ -214,7 +215,7 @@ def _trajectory(trajectory: JointTrajectory) -> list[str]:
         ranges = [_range(values[:, d, k]) for d in range(4)]
         rows.append([name, type(trajectory.laws[name]).__name__, *ranges])
     joints = count(len(rows), "joint")
-    line = f"{joints}, t = {trajectory.start:g} s to {trajectory.stop:g} s, {count(len(trajectory.times), 'instant')}"
+    line = f"{joints}, t = {time_text(trajectory.start)} s to {time_text(trajectory.stop)} s, {count(len(trajectory.times), 'instant')}"
     headings = ("joint", "law", *(f"{name}, SI" for name in names))
     return [*_title("Joint trajectory", line), *_tables([Table("Ranges", headings, rows)])]
 

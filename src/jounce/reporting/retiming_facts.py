@@ -14,6 +14,7 @@ from jounce.planning.paths.path import Path as JointPath
 from jounce.reporting.json.results import limits_result
 from jounce.reporting.load_changes import load_words
 from jounce.reporting.motion_ends import ends_words
+from jounce.reporting.text.numbers import time_text
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
 
@@ -78,7 +79,7 @@ def retimed_words(
         verdict = f"all {len(retimed.report.limited)} limits kept, between rows too; nearest"
         lines.append(
             f"{verdict if retimed.report.kept else 'NOT all limits kept; worst'}: {worst.joint} {worst.quantity}, "
-            f"{worst.ratio:.6f} of its limit at t = {worst.time:.5g} s"
+            f"{worst.ratio:.6f} of its limit at t = {time_text(worst.time, 5)} s"
         )
     return "\n".join(lines)
 

@@ -11,6 +11,7 @@ import numpy as np
 from jounce.dynamics.limits.limit_report import LimitRows
 from jounce.planning.elastic.link_errors import LinkErrors
 from jounce.planning.elastic.motor_motion import Feedforward
+from jounce.reporting.text.numbers import time_text
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
 
@@ -46,7 +47,7 @@ def drives_table(report: LimitRows) -> Table:
             number(row.value),
             number(row.limit),
             "-" if row.ratio is None else f"{row.ratio:.4f}",
-            f"{row.time:.5g}",
+            time_text(row.time, 5),
         ]
         for row in report.rows
     ]
@@ -74,7 +75,7 @@ def drives_verdict(report: LimitRows) -> str:
     worst = report.worst
     if worst is None:
         return "No limits are given."
-    location = f"{worst.joint} {worst.quantity}, {worst.ratio:.4g} of its limit at t = {worst.time:.5g} s"
+    location = f"{worst.joint} {worst.quantity}, {worst.ratio:.4g} of its limit at t = {time_text(worst.time, 5)} s"
     if report.kept:
         return f"All limits kept ({len(report.limited)}).\nClosest: {location}"
     return f"{len(report.broken)} of {count(len(report.limited), 'limit')} broken.\nWorst: {location}"

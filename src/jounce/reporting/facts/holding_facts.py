@@ -11,6 +11,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from jounce.io.files.writing import replacing
+from jounce.reporting.text.numbers import time_text
 from jounce.reporting.text.tables import Table, table
 from jounce.units.shown_units import ShownUnits
 
@@ -92,7 +93,7 @@ def holding_table(facts: list[dict[str, Any]], units: ShownUnits) -> Table:
     for each in facts:
         unit, factor = units.of(each["unit"], each["driver"])
         bounds = [
-            [_number(each, key, factor), "" if each[f"{key}_at"] is None else f"{each[f'{key}_at']:.5g}"]
+            [_number(each, key, factor), "" if each[f"{key}_at"] is None else time_text(each[f"{key}_at"], 5)]
             for key in ("least", "greatest")
         ]
         rows.append([each["driver"], unit, *bounds[0], *bounds[1], STAYS[each["self_locking"]], each["remark"]])

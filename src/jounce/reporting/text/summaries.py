@@ -15,6 +15,7 @@ from jounce.mechanism.time import last_step_words
 from jounce.reporting.load_changes import load_words
 from jounce.reporting.motion_ends import between_words, breaks_words, ends_words
 from jounce.reporting.text.law_facts import law_words
+from jounce.reporting.text.numbers import time_text
 from jounce.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def motion_summary(facts: Facts, file: str) -> str:
     """Return the summary of a motion: bodies, degrees of freedom, instants, and conservation of energy."""
     time, title = facts["time"], facts["title"] or file
     interval = (
-        f"t = {time['start']:g} s" if time["count"] == 1 else f"from t = {time['start']:g} s to {time['stop']:g} s"
+        f"t = {time_text(time['start'])} s" if time["count"] == 1 else f"from t = {time_text(time['start'])} s to {time_text(time['stop'])} s"
     )
     solved = time["solved"] == time["count"]
     instants = count(time["count"], "instant") if solved else f"{time['solved']} of {time['count']} instants"
@@ -74,7 +75,7 @@ def _conservation_lines(facts: Facts) -> list[str]:
     if kinks:
         names = ", ".join(dict.fromkeys(kink["name"] for kink in kinks))
         kinks_text = count(len(kinks), "kink or jump", "kinks or jumps")
-        lines.append(f"{kinks_text}: {names}, the first at t = {kinks[0]['time']:.6g} s; no derivatives there")
+        lines.append(f"{kinks_text}: {names}, the first at t = {time_text(kinks[0]['time'])} s; no derivatives there")
     lines.append(f"constraint drift: {facts['drift']:.1e} (rad, or sizes of the mechanism)")
     return lines
 
@@ -123,9 +124,9 @@ def _mechanism_start(facts: Facts) -> list[str]:
         )
         lines.append(f"  idle: {spinning} may spin about an axis of itself; held by the least motion")
     assembled = assembly["status"] == "assembled"
-    lines += ["", "Start", f"  assembled at t = {assembly['at']:g} s" if assembled else f"  {assembly['message']}"]
+    lines += ["", "Start", f"  assembled at t = {time_text(assembly['at'])} s" if assembled else f"  {assembly['message']}"]
     if time is not None:
-        lines.append(f"  time: {count(time['count'], 'instant')} from {time['start']:g} s to {time['stop']:g} s")
+        lines.append(f"  time: {count(time['count'], 'instant')} from {time_text(time['start'])} s to {time_text(time['stop'])} s")
         lines += [f"  {time['remark']}"] if "remark" in time else []
     else:
         lines.append("  no time grid is given")
@@ -154,7 +155,7 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
     moved = count(len(motion.names), "moving joint")
     lines = [
         f"{report.robot}: {moved} ({robot.name}, {trajectory.name})",
-        f"t = {motion.start:g} s to {motion.stop:g} s, {len(report.times)} instants and the peaks between them",
+        f"t = {time_text(motion.start)} s to {time_text(motion.stop)} s, {len(report.times)} instants and the peaks between them",
     ]
     lines += filter(None, [last_step_words(motion.times)])
     if report.held:
@@ -216,7 +217,7 @@ def verdict(report: LimitReport) -> str:
     number, worst = len(report.limited), report.worst
     assert worst is not None
     size = "infinite by a jump" if worst.infinite else f"{worst.ratio:.4g} of its limit"
-    location = f"{worst.joint} {worst.quantity}, {size} at t = {worst.time:.5g} s"
+    location = f"{worst.joint} {worst.quantity}, {size} at t = {time_text(worst.time, 5)} s"
     ends = [] if report.hand_over else breaks_words(report.ends)
     if report.kept:
         return f"All limits kept ({number}).\nClosest: {location}"

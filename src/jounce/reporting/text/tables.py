@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.reporting.peaks import Peak
+from jounce.reporting.text.numbers import time_text
 from jounce.reporting.text.summaries import Facts
 
 
@@ -78,7 +79,7 @@ def bodies_table(facts: Facts) -> Table:
             by = f"{_rounded(moved['distance']):.3g} m, {_rounded(math.degrees(moved['angle'])):.3g} deg"
         rows.append([body["name"], number(body["mass"]), vector(pose["position"]), vector(turned), by])
     state_words = "assembled" if facts["assembly"]["status"] == "assembled" else "as guessed"
-    title = f"Bodies, {state_words}, at t = {facts['assembly']['at']:g} s"
+    title = f"Bodies, {state_words}, at t = {time_text(facts['assembly']['at'])} s"
     return table(title, ("body", "mass/kg", "position/m", "angle/rad" if angle == "angle" else angle, "moved by"), rows)
 
 
@@ -156,14 +157,15 @@ def _count(closure: Facts, key: str) -> str:
 def peaks_table(given: Sequence[Peak]) -> Table:
     """Return peak values with their times, unless they are constant; the largest magnitudes are highlighted."""
     latest = max((abs(at) for p in given for at in (p.minimum_at, p.maximum_at) if math.isfinite(at)), default=1.0)
-    decimals = 3 - math.floor(math.log10(latest or 1.0))  # of times: enough digits for a reader
+    decimals = max(3 - math.floor(math.log10(latest or 1.0)), 3)  # of times: enough digits for a reader
     rows = []
     for peak in given:
-        early, late = (x if float(f"{x:.3g}") == x else round(x, decimals) for x in (peak.minimum_at, peak.maximum_at))
-        if not peak.varies:
-            early = late = math.nan
-        low, high = peak.shown
-        rows.append([peak.output, peak.derivative, peak.unit, *map(number, (low, early, high, late))])
+        early, late = (
+            time_text(x if float(f"{x:.3g}") == x else round(x, decimals)) if peak.varies else "-"
+            for x in (peak.minimum_at, peak.maximum_at)
+        )
+        low, high = map(number, peak.shown)
+        rows.append([peak.output, peak.derivative, peak.unit, low, early, high, late])
     marks = [[k for k, largest in zip((3, 5), peak.largest, strict=True) if largest] for peak in given]
     headings = ("output", "derivative", "unit", "minimum", "at t/s", "maximum", "at t/s")
     return Table("", headings, rows, (3, 4, 5, 6), True, marks, (3, 5), "largest magnitude")
@@ -173,7 +175,7 @@ def limits_table(report: LimitReport) -> Table:
     """Return the worst instant of each joint and quantity with a limit; violated limits are highlighted."""
     rows = [
         [row.joint, row.quantity, row.unit, "infinite" if row.infinite else number(row.value), number(row.limit or 0.0),
-         f"{row.ratio or 0.0:.4f}", f"{row.time:.5g}"]
+         f"{row.ratio or 0.0:.4f}", time_text(row.time, 5)]
         for row in report.limited
     ]  # fmt: skip
     marks = [[5] if row.broken else [] for row in report.limited]

@@ -1,0 +1,14 @@
+"""Numbers as text for readers."""
+
+LATE = 1e4  # s; later instants have decimals, as significant digits would not tell them apart
+
+
+def time_text(time: float, digits: int = 6) -> str:
+    """Return the text of an instant, s: significant digits, or for late ones, as of a clock, three decimals.
+
+    Examples
+    --------
+    >>> time_text(0.12345678), time_text(0.12345678, 3), time_text(1732686000.25), time_text(20000)
+    ('0.123457', '0.123', '1732686000.25', '20000')
+    """
+    return f"{time:.{digits}g}" if not abs(time) >= LATE else f"{time:.3f}".rstrip("0").rstrip(".")
