@@ -187,7 +187,23 @@ def _dispatch(arguments: list[str]) -> int:
     try:
         return application()(arguments, exit_on_error=False, print_error=False) or 0
     except cyclopts.CycloptsError as error:
-        raise JounceError(f"{' '.join(str(error).split())} (see jounce --help)") from None
+        command = " ".join(("jounce", *(error.command_chain or ())))
+        raise JounceError(f"{_words_of(error)} (see {command} --help)") from None
+
+
+def _words_of(error: Any) -> str:
+    """Return the message for words of the command line that do not fit the command, with the options in question."""
+    import cyclopts
+
+    words = " ".join(str(error).split())
+    if isinstance(error, cyclopts.UnusedCliTokensError):
+        return f"more words than the command takes: {' '.join(error.unused_tokens or ())}"
+    given = error.token.keyword if isinstance(error, cyclopts.UnknownOptionError) else None
+    if given and not given.startswith("--"):
+        names = [name for each in error.argument_collection for name in each.names]
+        alike = [name for name in names if name.startswith(f"-{given[:2]}")]
+        words += f" Did you mean {' or '.join(alike)}?" if alike else ""
+    return words
 
 
 def application() -> Any:

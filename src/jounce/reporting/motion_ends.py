@@ -11,7 +11,7 @@ from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.planning.paths.sampled_paths import lines_of
 from jounce.planning.paths.straight_lines import polynomials_at
 from jounce.planning.smoothing.smooth import SmoothedTrajectory, sampled
-from jounce.reporting.text.numbers import time_text
+from jounce.reporting.numbers import time_text
 from jounce.trajectory import HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 
 WITH_VELOCITIES = 5  # degree of splines through positions and velocities

@@ -24,8 +24,8 @@ from jounce.reporting.facts.mechanism.mechanism_facts import mechanism_facts
 from jounce.reporting.facts.modes_facts import equilibrium_facts, equilibrium_tables, equilibrium_words, modes_table
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.facts.robot_facts import robot_facts
+from jounce.reporting.numbers import interval_text, time_text
 from jounce.reporting.peaks import peaks, shown_peaks, table_peaks
-from jounce.reporting.text.numbers import time_text
 from jounce.reporting.text.summaries import count, robot_motion_words, verdict
 from jounce.reporting.text.tables import Table, limits_table, mechanism_tables, number, peaks_table, robot_tables, table
 from jounce.robot import Robot
@@ -162,7 +162,7 @@ def _motion(motion: Motion) -> list[str]:
     facts = motion_facts(motion)
     time = facts["time"]
     solved = f"{time['solved']} of {count(time['count'], 'instant')} solved"
-    line = f"{solved}, t = {time_text(time['start'])} s to {time_text(time['stop'])} s, order {facts['order']}"
+    line = f"{solved}, t = {interval_text(time['start'], time['stop'])}, order {facts['order']}"
     lines = _title(facts["title"] or "Motion", line)
     if facts["failures"]:
         first = facts["failures"][0]
@@ -215,7 +215,9 @@ def _trajectory(trajectory: JointTrajectory) -> list[str]:
         ranges = [_range(values[:, d, k]) for d in range(4)]
         rows.append([name, type(trajectory.laws[name]).__name__, *ranges])
     joints = count(len(rows), "joint")
-    line = f"{joints}, t = {time_text(trajectory.start)} s to {time_text(trajectory.stop)} s, {count(len(trajectory.times), 'instant')}"
+    line = (
+        f"{joints}, t = {interval_text(trajectory.start, trajectory.stop)}, {count(len(trajectory.times), 'instant')}"
+    )
     headings = ("joint", "law", *(f"{name}, SI" for name in names))
     return [*_title("Joint trajectory", line), *_tables([Table("Ranges", headings, rows)])]
 

@@ -14,7 +14,7 @@ from jounce.planning.paths.path import Path as JointPath
 from jounce.reporting.json.results import limits_result
 from jounce.reporting.load_changes import load_words
 from jounce.reporting.motion_ends import ends_words
-from jounce.reporting.text.numbers import time_text
+from jounce.reporting.numbers import time_text
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
 

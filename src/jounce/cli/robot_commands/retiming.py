@@ -23,8 +23,8 @@ from jounce.cli.robot_commands.joint_tables import joint_table
 from jounce.cli.robot_commands.servo import frequency_of
 from jounce.errors import JounceError, SampleWarning
 from jounce.io.files import DATA_FILES
+from jounce.reporting.numbers import interval_text
 from jounce.reporting.terminal import print_text, show_table
-from jounce.reporting.text.numbers import time_text
 
 if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
@@ -190,7 +190,7 @@ def _state(model: Any, names: Any, running: tuple[Path, float], reading: RobotRe
         if name not in motion.names:
             raise JounceError("the running trajectory does not name this joint of the path", path=file, name=name)
     if not motion.start <= instant <= motion.stop:
-        message = f"the running trajectory goes from {time_text(motion.start)} s to {time_text(motion.stop)} s"
+        message = f"the running trajectory goes from {interval_text(motion.start, motion.stop)}"
         raise JounceError(message, path=file, name="--at", value=instant)
     values = motion.derivatives(np.array([instant]), 2)[0]
     return values[:, [motion.names.index(name) for name in names]]

@@ -12,8 +12,8 @@ from jounce.cli.robot_commands.joint_tables import joint_table
 from jounce.cli.robot_commands.retiming import deviation_of
 from jounce.cli.robot_commands.servo import frequency_of
 from jounce.errors import SampleWarning
+from jounce.reporting.numbers import interval_text
 from jounce.reporting.terminal import print_text, show_table
-from jounce.reporting.text.numbers import time_text
 
 if TYPE_CHECKING:
     from jounce.robot import Robot
@@ -81,7 +81,9 @@ def smooth(
     times = time_grid(TimeGrid(motion.start, motion.stop, 1 / frequency), {})
     if not output.json:
         rows = "" if output.out is None else f"{len(times)} rows "
-        print_text(f"{rows}from {time_text(motion.start)} s to {time_text(motion.stop)} s, within {allowed:.3g} rad or m of each sample")
+        print_text(
+            f"{rows}from {interval_text(motion.start, motion.stop)}, within {allowed:.3g} rad or m of each sample"
+        )
         show_table(smoothing_table(motion))
         if words := smoothing_words(motion):
             print_text(words)

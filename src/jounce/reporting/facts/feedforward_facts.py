@@ -11,7 +11,7 @@ import numpy as np
 from jounce.dynamics.limits.limit_report import LimitRows
 from jounce.planning.elastic.link_errors import LinkErrors
 from jounce.planning.elastic.motor_motion import Feedforward
-from jounce.reporting.text.numbers import time_text
+from jounce.reporting.numbers import time_text
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
 

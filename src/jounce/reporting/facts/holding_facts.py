@@ -11,7 +11,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from jounce.io.files.writing import replacing
-from jounce.reporting.text.numbers import time_text
+from jounce.reporting.numbers import time_text
 from jounce.reporting.text.tables import Table, table
 from jounce.units.shown_units import ShownUnits
 

@@ -13,7 +13,7 @@ from typing_extensions import TypedDict
 from jounce.dynamics import Equilibrium, Linearization, Modes
 from jounce.dynamics.statics.independent_coordinates import COLUMNS
 from jounce.io.files.writing import replacing
-from jounce.reporting.text.numbers import time_text
+from jounce.reporting.numbers import time_text
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number, table, vector
 
@@ -83,7 +83,10 @@ def equilibrium_words(facts: EquilibriumFacts) -> str:
     """Describe the equilibrium of a mechanism, and whether it is stable."""
     freedom = count(facts["degrees_of_freedom"], "degree of freedom", "degrees of freedom")
     freed = f" without {', '.join(facts['without'])}" if facts["without"] else ""
-    lines = [f"equilibrium at t = {time_text(facts['time'])} s{freed}: {facts['stability']} ({facts['reason']})", freedom]
+    lines = [
+        f"equilibrium at t = {time_text(facts['time'])} s{freed}: {facts['stability']} ({facts['reason']})",
+        freedom,
+    ]
     return "\n".join([*lines, *(f"caution: {caution}" for caution in facts["cautions"])])
 
 

@@ -14,8 +14,8 @@ from jounce.dynamics.limits.trajectories import drives_note
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.load_changes import load_words
 from jounce.reporting.motion_ends import between_words, breaks_words, ends_words
+from jounce.reporting.numbers import interval_text, time_text
 from jounce.reporting.text.law_facts import law_words
-from jounce.reporting.text.numbers import time_text
 from jounce.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
@@ -31,7 +31,9 @@ def motion_summary(facts: Facts, file: str) -> str:
     """Return the summary of a motion: bodies, degrees of freedom, instants, and conservation of energy."""
     time, title = facts["time"], facts["title"] or file
     interval = (
-        f"t = {time_text(time['start'])} s" if time["count"] == 1 else f"from t = {time_text(time['start'])} s to {time_text(time['stop'])} s"
+        f"t = {time_text(time['start'])} s"
+        if time["count"] == 1
+        else f"from t = {interval_text(time['start'], time['stop'])}"
     )
     solved = time["solved"] == time["count"]
     instants = count(time["count"], "instant") if solved else f"{time['solved']} of {time['count']} instants"
@@ -124,9 +126,13 @@ def _mechanism_start(facts: Facts) -> list[str]:
         )
         lines.append(f"  idle: {spinning} may spin about an axis of itself; held by the least motion")
     assembled = assembly["status"] == "assembled"
-    lines += ["", "Start", f"  assembled at t = {time_text(assembly['at'])} s" if assembled else f"  {assembly['message']}"]
+    lines += [
+        "",
+        "Start",
+        f"  assembled at t = {time_text(assembly['at'])} s" if assembled else f"  {assembly['message']}",
+    ]
     if time is not None:
-        lines.append(f"  time: {count(time['count'], 'instant')} from {time_text(time['start'])} s to {time_text(time['stop'])} s")
+        lines.append(f"  time: {count(time['count'], 'instant')} from {interval_text(time['start'], time['stop'])}")
         lines += [f"  {time['remark']}"] if "remark" in time else []
     else:
         lines.append("  no time grid is given")
@@ -155,7 +161,7 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
     moved = count(len(motion.names), "moving joint")
     lines = [
         f"{report.robot}: {moved} ({robot.name}, {trajectory.name})",
-        f"t = {time_text(motion.start)} s to {time_text(motion.stop)} s, {len(report.times)} instants and the peaks between them",
+        f"t = {interval_text(motion.start, motion.stop)}, {len(report.times)} instants and the peaks between them",
     ]
     lines += filter(None, [last_step_words(motion.times)])
     if report.held:

@@ -12,3 +12,14 @@ def time_text(time: float, digits: int = 6) -> str:
     ('0.123457', '0.123', '1732686000.25', '20000')
     """
     return f"{time:.{digits}g}" if not abs(time) >= LATE else f"{time:.3f}".rstrip("0").rstrip(".")
+
+
+def interval_text(start: float, stop: float) -> str:
+    """Return the text of the ends of a time interval, s.
+
+    Examples
+    --------
+    >>> interval_text(0, 2.5)
+    '0 s to 2.5 s'
+    """
+    return f"{time_text(start)} s to {time_text(stop)} s"

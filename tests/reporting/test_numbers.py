@@ -4,15 +4,16 @@ import pytest
 
 import jounce as jn
 from jounce.dynamics.limits.trajectories import trajectory_torques
+from jounce.reporting.numbers import time_text
 from jounce.reporting.peaks import table_peaks
-from jounce.reporting.text.numbers import time_text
 from jounce.reporting.text.tables import limits_table, peaks_table
 
 EPOCH = 1732686000.0
 
 
 @pytest.mark.parametrize(
-    "time, text", [(-0.5, "-0.5"), (9999.5, "9999.5"), (12345.678, "12345.678"), (-EPOCH, "-1732686000"), (2e4, "20000")]
+    "time, text",
+    [(-0.5, "-0.5"), (9999.5, "9999.5"), (12345.678, "12345.678"), (-EPOCH, "-1732686000"), (2e4, "20000")],
 )
 def test_digits_of_instants(time, text):
     assert time_text(time) == text
