@@ -45,6 +45,7 @@ class Source:
     allow: tuple[str, ...] = ()
     error_type: type[JounceError] = MechanismFileError
     several: bool = False  # whether the data are a list of several documents
+    unfinished: int | None = None  # line of a last document that ends early, and is not among the data
 
     def line(self, location: Location) -> int | None:
         """Return the line of an entry, or of the innermost enclosing entry with a known line."""

@@ -59,7 +59,8 @@ def read_source(
     error_type : type
         Type of the exceptions, also of those that the source makes.
     many : bool, default False
-        Whether a YAML file may have several documents: its data are then the list of those that are not empty.
+        Whether a YAML file may have several documents: its data are then the list of those that are not empty. A last
+        one that ends within a line, or is no YAML, is left out (`unfinished`), as a printout that was interrupted.
 
     Returns
     -------
@@ -84,12 +85,30 @@ def read_source(
     try:
         text = _decode(name, read_file(name))
         several = many and reader is parsers.read_yaml and len(_DOCUMENT.findall(text)) > 0
-        source = _without_empty(parsers.read_yaml(name, text, many=True)) if several else reader(name, text)
+        source = _documents(name, text) if several else reader(name, text)
         source.allow, source.error_type = check_allowed(allow), error_type
     except MechanismFileError as error:
         raise error_type(error.message, path=error.path, line=error.line, name=error.name, value=error.value) from None
     if source.data is None and not source.lines:  # comments only
         raise error_type("the file is empty", path=name)
+    return source
+
+
+def _documents(path: str, text: str) -> Source:
+    """Return the source of several documents; without the last one, if it ends early and another is before it."""
+    last = [match.start() for match in _DOCUMENT.finditer(text)][-1]
+    head, tail = text[:last], text[last:].partition("\n")[2]
+    line = text.count("\n", 0, last) + 2
+    try:
+        source = _without_empty(parsers.read_yaml(path, text, many=True))
+    except MechanismFileError as error:
+        if not head.strip() or error.line is None or error.line < line:
+            raise
+    else:
+        if text.endswith("\n") or not head.strip() or not tail.strip():
+            return source
+    source = _without_empty(parsers.read_yaml(path, head, many=True))
+    source.unfinished = line
     return source
 
 

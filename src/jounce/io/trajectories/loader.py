@@ -58,8 +58,8 @@ def load_trajectory(
     ``target_q_0``, and ROS messages: JointTrajectory, FollowJointTrajectory goals, RobotTrajectory and
     DisplayTrajectory of MoveIt, as YAML (also as printed by ``ros2 topic echo``) or JSON. Polynomials go through their
     positions, with velocities and accelerations if given. Joint states, echoed or in a bag (.bag, .db3, .mcap, or the
-    folder of a bag; needs rosbags), are samples, as are the measured values in the states of
-    joint_trajectory_controller.
+    folder of a bag; needs rosbags), are samples, as are the positions in dynamic joint states, and the measured values
+    in the states of joint_trajectory_controller.
 
     Parameters
     ----------
@@ -162,8 +162,8 @@ def load_recording(
     source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError, many=True)
     if is_message(source.data):
         return read_messages(source, given)
-    if source.several:
-        second = source.lines.get((1,))
+    if source.several or source.unfinished is not None:
+        second = source.unfinished if source.unfinished is not None else source.lines.get((1,))
         raise TrajectoryError("a second YAML document starts (---)", path=name, line=second)
     if given is not None:
         message = "this file names its joints; give names for what controllers take only"

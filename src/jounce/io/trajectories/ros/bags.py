@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 from collections.abc import Sequence
 from decimal import Decimal
@@ -13,7 +14,7 @@ import numpy as np
 from jounce.errors import TrajectoryError
 from jounce.io.trajectories.recordings import LEVELS, Recording
 from jounce.io.trajectories.ros.joint_states import State, recorded_states
-from jounce.io.trajectories.ros.messages import MEASURED
+from jounce.io.trajectories.ros.states import MEASURED, SEVERAL_COORDINATES, interface_levels, left_out_notes
 from jounce.io.trajectories.stamps import in_sequence
 
 SUFFIXES = (".bag", ".db3", ".mcap")
@@ -21,7 +22,8 @@ METADATA = "metadata.yaml"
 NANO = 1_000_000_000
 STATE, TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
-STATES = (STATE, CONTROLLER)
+DYNAMIC = "control_msgs/msg/DynamicJointState"
+STATES = (STATE, CONTROLLER, DYNAMIC)
 MOST = 20_000_000
 """Largest number of messages."""
 
@@ -36,7 +38,7 @@ def is_bag(path: str) -> bool:
 
 
 def read_bag(path: str, joints: Sequence[str] | None = None, topic: str | None = None) -> Recording:
-    """Return the recording of a topic of a bag: JointState, JointTrajectoryControllerState, or one JointTrajectory.
+    """Return the recording of a topic of a bag: states of joints or of a controller, or one JointTrajectory.
 
     Raises
     ------
@@ -91,6 +93,8 @@ def _chosen(reader: Any, topic: str | None, path: str) -> list[Any]:
     if not topics:
         types = ", ".join(sorted({str(x.msgtype) for x in reader.connections})) or "nothing"
         message = f"the bag has no topic of {', '.join(STATES)} or {TRAJECTORY}"
+        if any("MultiDOF" in str(x.msgtype) for x in reader.connections):
+            message += f"; {SEVERAL_COORDINATES}"
         raise TrajectoryError(message, path=path, value=types)
     states = [x for x in topics if any(c.topic == x and c.msgtype in STATES for c in fit)]
     topics = topics if len(topics) == 1 or len(states) != 1 else states
@@ -101,13 +105,14 @@ def _chosen(reader: Any, topic: str | None, path: str) -> list[Any]:
 
 
 def _states(reader: Any, connections: list[Any], path: str) -> Recording:
-    states, received = [], []
+    states, received, others = [], [], dict[str, None]()
     for connection, stamp, raw in reader.messages(connections=connections):
         message = reader.deserialize(raw, connection.msgtype)
         if len(states) >= MOST:
             raise TrajectoryError(f"has more than {MOST} messages; cut the bag", path=path)
         own, (names, *levels) = message.header.stamp, _measured(message)
         number = len(states) + 1
+        others.update(dict.fromkeys(x for x in getattr(message, "joint_names", ()) if x not in names))
         if not names or len(levels[0]) != len(names) or not np.isfinite(levels[0]).all():
             fault = f"message {number} of {connection.topic} must have one finite position for each joint"
             raise TrajectoryError(fault, path=path, name="position", value=levels[0].tolist()[:10])
@@ -123,11 +128,17 @@ def _states(reader: Any, connections: list[Any], path: str) -> Recording:
         raise TrajectoryError("at least two samples are needed", path=path, value=len(states))
     if not any(state.stamp for state in states):  # without stamps: the times of reception
         states = [State(stamp, x.names, x.levels) for stamp, x in zip(received, states, strict=True)]
-    return recorded_states(path, states)
+    recording = recorded_states(path, states)
+    return dataclasses.replace(recording, notes=(*recording.notes, *left_out_notes(others)))
 
 
 def _measured(message: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Return names, positions and velocities of a joint state, or of the measured part of a controller state."""
+    """Return names, positions and velocities of a joint state, or of what a controller measured."""
+    if hasattr(message, "interface_values"):
+        values = [dict(zip(x.interface_names, x.values, strict=False)) for x in message.interface_values]
+        names, levels = interface_levels(list(message.joint_names), values)
+        velocities = levels[1] if len(levels) > 1 else []
+        return list(names), np.asarray(levels[0], float), np.asarray(velocities, float)
     if hasattr(message, "joint_names"):
         part = next(getattr(message, key) for key in MEASURED if hasattr(message, key))
         return list(message.joint_names), np.asarray(part.positions, float), np.asarray(part.velocities, float)

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from decimal import Decimal
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from jounce.io.files.located_data import Location, Source
 from jounce.io.trajectories.recordings import LEVELS, Recording
-from jounce.io.trajectories.ros.joint_states import State, recorded_states
+from jounce.io.trajectories.ros.fields import check_whole, joint_names, joint_row, seconds_of
+from jounce.io.trajectories.ros.states import (
+    SEVERAL_COORDINATES,
+    is_joint_state,
+    is_state,
+    read_states,
+    without_unfinished,
+)
 from jounce.io.trajectories.stamps import in_sequence
 
-NANO = 1_000_000_000
-STATES = ("position", "velocity")
-MEASURED = ("feedback", "actual")
-"""Keys of the measured values in a controller state, in newer and older versions."""
 SEVERAL = ("multi_dof_joint_trajectory", "multi_dof_trajectory")
 """Where RobotTrajectory and goals of controllers hold the motion of planar and floating joints."""
-CUT = "..."
-"""Text that ``ros2 topic echo`` prints in place of omitted entries."""
 START = 1e-6  # rad or m, largest distance of the robot from the start of a trajectory
 _POINT = {*LEVELS, "effort", "time_from_start"}
 _INSIDE: tuple[tuple[str, ...], ...] = ((), ("trajectory",), ("joint_trajectory",), ("goal", "trajectory"))
@@ -34,12 +34,7 @@ def is_message(data: Any) -> bool:
     if not isinstance(first, dict):
         return False
     displayed = isinstance(first.get("trajectory"), list) and "model_id" in first
-    return (
-        displayed
-        or _is_state(first)
-        or measured_part(first) is not None
-        or any(_is_trajectory(_inside(first, keys)) for keys in _INSIDE)
-    )
+    return displayed or is_state(first) or any(_is_trajectory(_inside(first, keys)) for keys in _INSIDE)
 
 
 def _inside(data: Any, keys: Sequence[str]) -> Any:
@@ -52,22 +47,11 @@ def _is_trajectory(data: Any) -> bool:
     return isinstance(data, dict) and "joint_names" in data and "points" in data
 
 
-def _is_state(data: Any) -> bool:
-    return isinstance(data, dict) and "name" in data and "position" in data
-
-
-def measured_part(data: Any) -> str | None:
-    """Return the key of the measured values in a controller state; None for other data."""
-    if not isinstance(data, dict) or "joint_names" not in data or "points" in data:
-        return None
-    return next((key for key in MEASURED if isinstance(data.get(key), dict)), None)
-
-
 def read_messages(source: Source, joints: Sequence[str] | None = None) -> Recording:
     """Return the recording of a ROS message, or of a list of joint states; `joints` replace the names in it.
 
     The message is a JointTrajectory, a FollowJointTrajectory goal, a RobotTrajectory or DisplayTrajectory of MoveIt, a
-    JointState, or a JointTrajectoryControllerState, whose measured values are read.
+    JointState, a DynamicJointState, or a JointTrajectoryControllerState, whose measured values are read.
 
     Raises
     ------
@@ -75,20 +59,16 @@ def read_messages(source: Source, joints: Sequence[str] | None = None) -> Record
         If something is missing, or is not the required number: the message names the line.
     """
     data = source.data
-    if isinstance(data, list) and all(map(_is_state, data)):
-        recording = _states(source)
-    elif isinstance(data, list) and all(measured_part(x) is not None for x in data):
-        recording = _controller_states(source)
+    if is_state(data[0] if isinstance(data, list) else data):
+        recording = read_states(source)
     elif isinstance(data, list) and len(data) == 1:
         lines = {location[1:]: line for location, line in source.lines.items() if location[:1] == (0,)}
         recording = _trajectories(dataclasses.replace(source, data=data[0], lines=lines))
     elif isinstance(data, list):
         message = f"the file has {len(data)} messages, each a trajectory of its own; keep one"
         raise source.error(message, (1,))
-    elif _is_state(data) or measured_part(data) is not None:
-        raise source.error("a single state is no trajectory; echo more than one")
     else:
-        recording = _trajectories(source)
+        recording = without_unfinished(source, _trajectories(source))
     recording = in_sequence(recording)
     return recording if joints is None else recording.renamed(tuple(joints))
 
@@ -144,7 +124,7 @@ def _started(source: Source, recording: Recording) -> Recording:
     """Raise an error if a message states that the robot does not start where its trajectory does."""
     at: Location = ("trajectory_start", "joint_state")
     state = _at(source, at)
-    if not _is_state(state) or len(state["name"]) != len(state["position"]):
+    if not is_joint_state(state) or len(state["name"]) != len(state["position"]):
         return recording
     where = dict(zip(state["name"], state["position"], strict=True))
     for k, name in enumerate(recording.names):
@@ -174,105 +154,28 @@ def _points(source: Source, at: Location) -> Recording:
     for key in data:
         if key not in ("header", "joint_names", "points"):
             raise source.error("unknown key of a trajectory; valid: header, joint_names, points", (*at, key))
-    names = _names(source, (*at, "joint_names"), data["joint_names"])
+    names = joint_names(source, (*at, "joint_names"), data["joint_names"])
     points = data["points"]
-    _check_whole(source, (*at, "points"), points)
+    check_whole(source, (*at, "points"), points)
     if not isinstance(points, list) or len(points) < 2:
         raise source.error("must be a list of two points at least", (*at, "points"))
     values = np.full((len(points), len(LEVELS), len(names)), np.nan)
     times, lines = [], []
     for k, point in enumerate(points):
         place: Location = (*at, "points", k)
+        if isinstance(point, dict) and "transforms" in point:
+            raise source.error(SEVERAL_COORDINATES, place)
         if not isinstance(point, dict) or set(point) - _POINT:
             raise source.error("must be a point of a trajectory, with positions", place, value=point)
         if not point.get("positions"):
             raise source.error("positions are missing", place)
         for level, key in enumerate(LEVELS):
             if point.get(key):
-                values[k, level] = _row(source, (*place, key), point[key], len(names))
-        times.append(_seconds(source, (*place, "time_from_start"), point.get("time_from_start")))
+                values[k, level] = joint_row(source, (*place, key), point[key], len(names))
+        times.append(seconds_of(source, (*place, "time_from_start"), point.get("time_from_start")))
         lines.append(source.line(place) or 0)
         if k and times[k] < times[k - 1]:
             message = "must come after that of the point before"
             raise source.error(message, (*place, "time_from_start"), value=times[k])
     given = len(LEVELS) - int(np.argmax(np.append(~np.isnan(values).all(axis=(0, 2)), True)[::-1][1:]))
     return Recording(source.path, names, np.array(times), values[:, :given], lines, points=True)
-
-
-def _states(source: Source) -> Recording:
-    """Return the recording of a list of joint states."""
-    states = []
-    for k, state in enumerate(source.data):
-        names = _names(source, (k, "name"), state["name"])
-        levels = [_row(source, (k, key), state[key], len(names), key != STATES[0]) for key in STATES if state.get(key)]
-        if not state["position"]:
-            raise source.error("positions are missing", (k, "position"))
-        header = state.get("header")
-        stamp = _stamp(source, (k, "header", "stamp"), header.get("stamp") if isinstance(header, dict) else None)
-        states.append(State(stamp, names, levels, source.line((k,)) or 0))
-    return recorded_states(source.path, states)
-
-
-def _controller_states(source: Source) -> Recording:
-    """Return the recording of the measured values in a list of controller states."""
-    states, keys = [], set()
-    for k, state in enumerate(source.data):
-        key = str(measured_part(state))
-        names, part = _names(source, (k, "joint_names"), state["joint_names"]), state[key]
-        if not part.get("positions"):
-            raise source.error("positions are missing", (k, key))
-        levels = [_row(source, (k, key, x), part[x], len(names), x != LEVELS[0]) for x in LEVELS[:2] if part.get(x)]
-        header = state.get("header")
-        stamp = _stamp(source, (k, "header", "stamp"), header.get("stamp") if isinstance(header, dict) else None)
-        states.append(State(stamp, names, levels, source.line((k,)) or 0))
-        keys.add(key)
-    recording = recorded_states(source.path, states)
-    note = f"of the states of a controller, only measured values are read ({', '.join(sorted(keys))})"
-    return dataclasses.replace(recording, notes=(*recording.notes, note))
-
-
-def _names(source: Source, at: Location, own: Any) -> tuple[str, ...]:
-    _check_whole(source, at, own)
-    if not isinstance(own, list) or not own or not all(isinstance(name, str) for name in own):
-        raise source.error("must be a list of names", at, value=own)
-    if len(set(own)) < len(own):
-        raise source.error("a joint is named twice", at, value=own)
-    return tuple(own)
-
-
-def _check_whole(source: Source, at: Location, given: Any) -> None:
-    if isinstance(given, list) and CUT in given:
-        message = "was cut where it was printed; echo it with --full-length"
-        raise source.error(message, at)
-
-
-def _row(source: Source, at: Location, given: Any, count: int, unknown: bool = False) -> list[float]:
-    """Return a number for each joint; NaN, of what is not measured, only where some may be unknown."""
-    _check_whole(source, at, given)
-    numbers = isinstance(given, list) and all(isinstance(x, int | float) and not isinstance(x, bool) for x in given)
-    if not numbers or len(given) != count or not (np.isfinite(given) | (unknown & np.isnan(given))).all():
-        raise source.error(f"must be {count} finite numbers, one for each joint: {at[-1]}", at, value=given)
-    return [float(x) for x in given]
-
-
-def _seconds(source: Source, at: Location, given: Any) -> float:
-    if given is None:
-        message = (
-            "is missing: the time of each point since the start, as {sec: 1, nanosec: 0} or as a number of seconds"
-        )
-        raise source.error(message, at)
-    if isinstance(given, int | float) and not isinstance(given, bool) and np.isfinite(given) and given >= 0:
-        return float(given)
-    return float(_stamp(source, at, given))
-
-
-def _stamp(source: Source, at: Location, given: Any) -> Decimal:
-    """Return a time of ROS 2 or ROS, s, exactly."""
-    parts = ("sec", "nanosec") if isinstance(given, Mapping) and "sec" in given else ("secs", "nsecs")
-    if not isinstance(given, Mapping) or set(given) - set(parts):
-        raise source.error("must be a time, as {sec: 1, nanosec: 0}", at, value=given)
-    values = [given.get(part, 0) for part in parts]
-    for part, value in zip(parts, values, strict=True):
-        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            raise source.error("must be a whole number, 0 or greater", (*at, part), value=value)
-    return Decimal(values[0]) + Decimal(values[1]) / NANO
