@@ -4,9 +4,9 @@ import pytest
 
 import jounce as jn
 from jounce.dynamics.limits.trajectories import trajectory_torques
-from jounce.reporting.numbers import time_text
 from jounce.reporting.peaks import table_peaks
 from jounce.reporting.text.tables import limits_table, peaks_table
+from jounce.units.instants import time_text
 
 EPOCH = 1732686000.0
 

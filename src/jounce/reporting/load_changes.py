@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from jounce.dynamics.limits.limit_report import LimitReport
-from jounce.reporting.numbers import time_text
+from jounce.units.instants import time_text
 
 STILL = 1e-6  # m/s: lower speeds count as zero, as instants and rows of files have about six digits
 

@@ -11,8 +11,8 @@ from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.planning.paths.sampled_paths import lines_of
 from jounce.planning.paths.straight_lines import polynomials_at
 from jounce.planning.smoothing.smooth import SmoothedTrajectory, sampled
-from jounce.reporting.numbers import time_text
 from jounce.trajectory import HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
+from jounce.units.instants import time_text
 
 WITH_VELOCITIES = 5  # degree of splines through positions and velocities
 LOOKS = 8  # sample intervals between two points

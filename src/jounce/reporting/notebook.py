@@ -24,12 +24,12 @@ from jounce.reporting.facts.mechanism.mechanism_facts import mechanism_facts
 from jounce.reporting.facts.modes_facts import equilibrium_facts, equilibrium_tables, equilibrium_words, modes_table
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.facts.robot_facts import robot_facts
-from jounce.reporting.numbers import interval_text, time_text
 from jounce.reporting.peaks import peaks, shown_peaks, table_peaks
 from jounce.reporting.text.summaries import count, robot_motion_words, verdict
 from jounce.reporting.text.tables import Table, limits_table, mechanism_tables, number, peaks_table, robot_tables, table
 from jounce.robot import Robot
 from jounce.trajectory import JointTrajectory
+from jounce.units.instants import interval_text, time_text
 
 ROWS = 30  # of a table; further rows are only counted
 # Colors are those of the page, for light and dark themes; lines are translucent gray.
@@ -276,7 +276,7 @@ def _batch(batch: Batch) -> list[str]:
         first = np.take(finite, 0, axis=2) if finite.size else np.full((1, 1), np.nan)
         outputs.append([name, " x ".join(map(str, values.shape)), number(first.min()), number(first.max())])
     return [
-        *_title("Batch of simulations", line, f"t = {batch.time[0]:g} s to {batch.time[-1]:g} s"),
+        *_title("Batch of simulations", line, f"t = {interval_text(batch.time[0], batch.time[-1])}"),
         *_tables(
             [
                 Table("Parameters (SI)", ("name", "smallest", "largest"), parameters, (1, 2)),

@@ -14,9 +14,9 @@ from jounce.planning.paths.path import Path as JointPath
 from jounce.reporting.json.results import limits_result
 from jounce.reporting.load_changes import load_words
 from jounce.reporting.motion_ends import ends_words
-from jounce.reporting.numbers import time_text
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
+from jounce.units.instants import time_text
 
 NEGLIGIBLE = 1e-9  # rad or m: smaller distances of a path from a trajectory are rounding, and are not shown
 

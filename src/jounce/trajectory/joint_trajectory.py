@@ -31,6 +31,7 @@ from jounce.trajectory.motion import SplineMotion
 from jounce.trajectory.sample_errors import TOLERANCE, unsupported_derivative, unsupported_words
 from jounce.trajectory.sampled.deferred import Laws, SampledLaw, law_through
 from jounce.trajectory.splines import check_odd
+from jounce.units.instants import interval_text
 
 MAX_ORDER = 30
 
@@ -239,7 +240,7 @@ class JointTrajectory(Displayed):
         return type(self), (self.laws.given(), self.start, self.stop, self.times, dict(self.measures))
 
     def __repr__(self) -> str:
-        return f"JointTrajectory({', '.join(self.names)}; {self.start:g} to {self.stop:g} s)"
+        return f"JointTrajectory({', '.join(self.names)}; {interval_text(self.start, self.stop)})"
 
     def __call__(self, time: Jet, names: Iterable[str] | None = None) -> Jet:
         """Return the jet of the positions, joints first; it can be traced, and instants are not checked.

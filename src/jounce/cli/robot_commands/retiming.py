@@ -23,7 +23,6 @@ from jounce.cli.robot_commands.joint_tables import joint_table
 from jounce.cli.robot_commands.servo import frequency_of
 from jounce.errors import JounceError, SampleWarning
 from jounce.io.files import DATA_FILES
-from jounce.reporting.numbers import interval_text
 from jounce.reporting.terminal import print_text, show_table
 
 if TYPE_CHECKING:
@@ -183,6 +182,8 @@ def instant_of(text: str) -> float:
 def _state(model: Any, names: Any, running: tuple[Path, float], reading: RobotReading) -> Any:
     """Return positions, velocities and accelerations of the joints of a path on a running trajectory."""
     import numpy as np
+
+    from jounce.units.instants import interval_text
 
     file, instant = running
     motion = reading.trajectory(file, model)

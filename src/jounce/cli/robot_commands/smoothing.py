@@ -12,7 +12,6 @@ from jounce.cli.robot_commands.joint_tables import joint_table
 from jounce.cli.robot_commands.retiming import deviation_of
 from jounce.cli.robot_commands.servo import frequency_of
 from jounce.errors import SampleWarning
-from jounce.reporting.numbers import interval_text
 from jounce.reporting.terminal import print_text, show_table
 
 if TYPE_CHECKING:
@@ -62,6 +61,7 @@ def smooth(
     from jounce.mechanism import TimeGrid, time_grid
     from jounce.planning import smooth as find
     from jounce.reporting.smoothing_facts import smoothing_result, smoothing_table, smoothing_words
+    from jounce.units.instants import interval_text
 
     output.check()
     if figure is not None:

@@ -9,6 +9,7 @@ from jounce.base.display import Displayed
 from jounce.base.shapes import Array
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.robot.algorithms.carried_loads import LoadChange
+from jounce.units.instants import time_text
 
 ROUNDING = 1e-9  # by which a ratio may exceed 1
 
@@ -139,7 +140,8 @@ class LimitReport(LimitRows, Displayed):
         counts = f"{len(self.limited)} limits, {len(self.broken)} broken"
         if (worst := self.worst) is not None:
             counts += (
-                f"; {worst.quantity} of {worst.joint} takes {worst.ratio:.6g} of its limit at t = {worst.time:.6g} s"
+                f"; {worst.quantity} of {worst.joint} takes {worst.ratio:.6g} of its limit at t = "
+                f"{time_text(worst.time)} s"
             )
         return f"<LimitReport of {self.robot}: {counts}>"
 

@@ -16,6 +16,7 @@ from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.trajectory.law_checks.unit_doubts import trajectory_doubt
+from jounce.units.instants import time_text
 from jounce.units.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ class FollowedTrajectory:
         if len(bad):
             instant, level, joint = bad[0]
             quantity = names[level] if level < len(names) else f"derivative {level} of the {names[0]}"
-            message = f"the {quantity} of this joint is not finite at t = {times[instant]:g} s"
+            message = f"the {quantity} of this joint is not finite at t = {time_text(float(times[instant]))} s"
             raise TrajectoryError(f"{message}; choose another law there", name=self.robot.joint_names[joint])
 
 

@@ -9,6 +9,7 @@ from numpy.polynomial import legendre, polynomial
 
 from jounce.errors import TrajectoryError
 from jounce.trajectory.motion import SplineMotion
+from jounce.units.instants import time_text
 
 POINTS = 10  # Gauss points of each piece
 NODES, WEIGHTS = legendre.leggauss(POINTS)
@@ -98,7 +99,9 @@ def resolved(
     while len(start):
         total += len(start)
         if total > MOST:
-            message = f"changes too quickly near t = {start[0]:.9g} s to be followed; smooth the trajectory there"
+            message = (
+                f"changes too quickly near t = {time_text(start[0])} s to be followed; smooth the trajectory there"
+            )
             raise TrajectoryError(message)
         values = function(points_of(start, stop).reshape(-1)).reshape(len(start), POINTS, -1)
         largest = np.maximum(largest, np.abs(values).max(axis=(0, 1)))

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from jounce.base.shapes import Array
 from jounce.errors import TrajectoryError
 from jounce.planning.elastic.pieces import ANALYSIS, POINTS, points_of, resolved
+from jounce.units.instants import time_text
 
 ROUNDING = 1e-14  # fraction of the largest torque of all joints, or of its derivative
 JUMP = 1e-6  # fraction of the largest value: less is rounding
@@ -84,7 +85,8 @@ class SpringDeflection:
             need = ("acceleration", "jerk", "jounce")[level] if level < 3 else f"derivative {level + 2}"
             message = (
                 f"the {f'rate {level} of the ' if level else ''}torque of the spring jumps by {jump:.3g} near "
-                f"t = {time:.6g} s, and the {derivative} of its motor would have to jump too; choose a trajectory "
+                f"t = {time_text(time)} s, and the {derivative} of its motor would have to jump too; "
+                "choose a trajectory "
                 f"whose derivatives are continuous to {need}"
             )
             raise TrajectoryError(message, name=names[joint])

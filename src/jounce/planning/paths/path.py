@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from jounce.trajectory import AbstractMotion
 from jounce.trajectory.laws.stacking import law_derivatives
+from jounce.units.instants import time_text
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class Path:
 
     def location(self, s: float) -> str:
         """Return a description of a place on the path for messages, with the time of the samples if it has any."""
-        note = "" if self.instants is None else f" (t = {np.interp(s, *self.instants):.6g} s of the samples)"
+        note = "" if self.instants is None else f" (t = {time_text(np.interp(s, *self.instants))} s of the samples)"
         return f"s = {s:.6g}{note}"
 
     def derivatives(self, s: Float[np.ndarray, " point"], order: int) -> Float[np.ndarray, "point derivative joint"]:

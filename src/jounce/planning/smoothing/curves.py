@@ -15,6 +15,7 @@ from jounce.planning.smoothing.bases import DEGREE, Samples, banded, cost, parts
 from jounce.planning.smoothing.dwells import Dwell
 from jounce.planning.smoothing.weights import IntervalEstimate
 from jounce.planning.solver import cone_solver
+from jounce.units.instants import time_text
 
 CELL = np.pi / 4  # length of a cell times the cutoff frequency
 GRADED = 1.6  # ratio of the lengths of neighboring cells
@@ -77,7 +78,9 @@ def smoothed_curve(
             far = reason.samples
             knots = _halved(knots, times, far)
     at = float(times[far[0]])
-    message = f"no smooth motion stays within the deviation of the samples near t = {at:g} s; allow a larger one"
+    message = (
+        f"no smooth motion stays within the deviation of the samples near t = {time_text(at)} s; allow a larger one"
+    )
     raise SolveError(message, name="deviation", value=deviation)
 
 

@@ -19,6 +19,7 @@ from jounce.trajectory import AbstractMotion, HermiteMotion, HermiteSplineMotion
 from jounce.trajectory.checks import positive
 from jounce.trajectory.sampled.deferred import SampledLaw
 from jounce.trajectory.splines import local_powers
+from jounce.units.instants import time_text
 
 FEWEST = 12  # samples
 NEIGHBORS = 4  # samples on either side with which a sample is compared
@@ -170,8 +171,8 @@ def _check_turns(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, 
         first = int(np.argmax(turned))
         count = f"; {np.sum(turned)} steps are such" if np.sum(turned) > 1 else ""
         message = (
-            f"goes by a whole turn, {steps[first]:.6g}, at t = {times[first + 1]:.6g} s{count}: count the turns of "
-            "an angle (numpy.unwrap)"
+            f"goes by a whole turn, {steps[first]:.6g}, at t = {time_text(times[first + 1])} s{count}: "
+            "count the turns of an angle (numpy.unwrap)"
         )
         raise TrajectoryError(message)
 
@@ -199,8 +200,8 @@ def _repeated(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " s
     at = int(moving[first]) + 2
     return (
         f"{int(stays[:-1][chosen].sum())} of {len(values)} samples repeat the one before while the joint moves, the "
-        f"first at t = {times[at]:.6g} s: they are old, and the motion follows them within the deviation; leave out "
-        "what repeats"
+        f"first at t = {time_text(times[at])} s: they are old, and the motion follows them within the "
+        "deviation; leave out what repeats"
     )
 
 
@@ -217,8 +218,8 @@ def _outlier(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sa
     first = int(far[0]) + 1
     count = f"; {len(far)} samples are such" if len(far) > 1 else ""
     return (
-        f"the sample at t = {times[first]:.6g} s is {off[first - 1]:.3g} from those beside it{count}: the motion goes "
-        "there and back, within the deviation; leave out what is an outlier"
+        f"the sample at t = {time_text(times[first])} s is {off[first - 1]:.3g} from those beside it{count}: "
+        "the motion goes there and back, within the deviation; leave out what is an outlier"
     )
 
 
@@ -302,7 +303,7 @@ def _fitting(times: np.ndarray, values: np.ndarray, dwell: Dwell, deviation: flo
     if low > high:
         at = int(dwell.first + np.argmax(np.abs(own - np.median(own))))
         message = (
-            f"samples of a dwell differ by {np.ptp(own):.3g} about t = {times[at]:.6g} s, more than twice the "
+            f"samples of a dwell differ by {np.ptp(own):.3g} about t = {time_text(times[at])} s, more than twice the "
             f"deviation of {deviation:.3g}; choose a larger one"
         )
         raise TrajectoryError(message)

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from jounce.errors import TrajectoryError
 from jounce.trajectory import HermiteMotion
 from jounce.trajectory.motion import SplineMotion
+from jounce.units.instants import time_text
 
 SHARES = np.array([0.04, 0.15, 0.29, 0.43, 0.57, 0.71, 0.85, 0.96])  # positions in an interval where laws are compared
 NEAR = 1e-9  # rad or m, or fraction of the largest coordinate: largest error of the laws
@@ -185,7 +186,8 @@ def _kink(exact: Callable[[_Times], _Motion], ends: Float[np.ndarray, " 2"], q: 
     off = np.where(looks[:, None] <= at, left, right) - exact(looks)[:, 0]
     if not max(np.abs(off).max(), np.abs(left - right)[looks == at].max()) <= near:
         message = (
-            f"the joints jump, or the path has a spike that is too narrow to be followed, at t = {ends.mean():.9g} s: "
+            "the joints jump, or the path has a spike that is too narrow to be followed, at t = "
+            f"{time_text(ends.mean())} s: "
             "give laws that are continuous there, and instants about it"
         )
         raise TrajectoryError(message, name="time", value=float(ends.mean()))

@@ -27,6 +27,7 @@ from jounce.robot.recursions.batches import Batched
 from jounce.robot.robot import Robot
 from jounce.trajectory import HermiteMotion
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
+from jounce.units.instants import time_text
 
 INSTANTS = 201
 BLOCKS = (256, 1024)  # instants per call, so that few programs are compiled
@@ -170,22 +171,23 @@ class ToolPathMotion(Displayed):
         lost = ", ".join(losing_joints(self.robot.joint_names, shares[rank - 1]))
         if values[rank - 1] <= WEAK * values[0]:
             return Status.SINGULAR, (
-                f"the path runs into a singular position at t = {time:.6g} s, where the motions of {lost} cancel at "
+                f"the path runs into a singular position at t = {time_text(time)} s, where the "
+                f"motions of {lost} cancel at "
                 f"the tool (singular values from {values[0]:.2g} down to {values[rank - 1]:.2g}); let the path "
                 "avoid it, or begin on another branch"
             )
         if jump > JUMP:
-            return Status.BRANCH_JUMP, f"the path jumps at t = {time:.6g} s; its laws must be continuous"
+            return Status.BRANCH_JUMP, f"the path jumps at t = {time_text(time)} s; its laws must be continuous"
         if equations.has_posture or equations.fixed_joints:
             kind, other = (
                 ("posture", "posture, other weights") if equations.has_posture else ("joints held", "law of them")
             )
             return Status.SINGULAR, (
-                f"the path is singular with the {kind} at t = {time:.6g} s: the coordinates reverse there; give "
+                f"the path is singular with the {kind} at t = {time_text(time)} s: the coordinates reverse there; give "
                 f"another {other}, or another start"
             )
         return Status.SINGULAR, (
-            f"the path could not be followed beyond t = {time:.6g} s: no motion of the joints continues it there"
+            f"the path could not be followed beyond t = {time_text(time)} s: no motion of the joints continues it there"
         )
 
     def __repr__(self) -> str:
@@ -196,25 +198,25 @@ class ToolPathMotion(Displayed):
         """Return the result at an instant in words: the failure and its cause, and the joints that lose a motion."""
         status, time, words = Status(int(self.status[index])), float(self.time[index]), []
         if status in (Status.SINGULAR, Status.BRANCH_JUMP, Status.NOT_REACHED):
-            return self.ending or f"singular at t = {time:.6g} s"
+            return self.ending or f"singular at t = {time_text(time)} s"
         if status == Status.NOT_ASSEMBLED:
             words.append(
-                f"the joints cannot keep the tool on the path at t = {time:.6g} s: the pose misses it by "
+                f"the joints cannot keep the tool on the path at t = {time_text(time)} s: the pose misses it by "
                 f"{self.residual[index, 0]:.3g} rad, or sizes of the robot, or a derivative does; prescribe less, such "
                 "as a direction instead of an orientation"
             )
         if status == Status.NOT_CONVERGED:
-            words.append(f"not converged at t = {time:.6g} s")
+            words.append(f"not converged at t = {time_text(time)} s")
         if status == Status.INADMISSIBLE:
             k = int(np.argmax(self._outside[index]))
             name = (*self.robot.joint_names, *SharedFollowers.of(self.robot).names)[k]
             words.append(
-                f"{name} leaves its range at t = {time:.6g} s, where it is {self._places[index, k]:.6g}; choose "
+                f"{name} leaves its range at t = {time_text(time)} s, where it is {self._places[index, k]:.6g}; choose "
                 "another start, posture or path, or limits=False"
             )
         if self.singular[index]:
             lost = ", ".join(losing_joints(self.robot.joint_names, self._shares[index]))
-            words.append(f"nearly singular at t = {time:.6g} s: the motions of {lost} cancel at the tool")
+            words.append(f"nearly singular at t = {time_text(time)} s: the motions of {lost} cancel at the tool")
         return "; ".join(words) or "followed"
 
     def at(self, time: ArrayLike, order: int | None = None) -> "ToolPathMotion":

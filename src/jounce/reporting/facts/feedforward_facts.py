@@ -11,9 +11,9 @@ import numpy as np
 from jounce.dynamics.limits.limit_report import LimitRows
 from jounce.planning.elastic.link_errors import LinkErrors
 from jounce.planning.elastic.motor_motion import Feedforward
-from jounce.reporting.numbers import time_text
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
+from jounce.units.instants import interval_text, time_text
 
 REST = 1e-6  # fraction of the largest velocity of a motor: slower motors are at rest
 
@@ -24,7 +24,7 @@ def feedforward_words(motion: Feedforward, resting: Mapping[str, float]) -> str:
     rigid = [name for name in motion.names if name not in elastic]
     lines = [
         f"{motion.title}: {count(len(motion.names), 'drive')}, {len(elastic)} of them elastic",
-        f"t = {motion.time[0]:g} s to {motion.time[-1]:g} s, {count(len(motion.time), 'instant')}",
+        f"t = {interval_text(motion.time[0], motion.time[-1])}, {count(len(motion.time), 'instant')}",
     ]
     if rigid:
         lines.append(f"rigid: {', '.join(rigid)}")
@@ -93,7 +93,7 @@ def link_error_words(errors: LinkErrors) -> str:
 def _largest(values: np.ndarray, errors: LinkErrors) -> str:
     lost = ~np.isfinite(values).all(axis=1)
     if lost.any():
-        return f"more than can be followed beyond t = {errors.time[np.argmax(lost)]:g} s"
+        return f"more than can be followed beyond t = {time_text(errors.time[np.argmax(lost)])} s"
     column = int(np.argmax(values.max(axis=0)))
     return f"{values[:, column].max():.2g} {errors.units[column]} ({errors.names[column]})"
 

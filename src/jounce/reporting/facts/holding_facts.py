@@ -11,8 +11,8 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from jounce.io.files.writing import replacing
-from jounce.reporting.numbers import time_text
 from jounce.reporting.text.tables import Table, table
+from jounce.units.instants import time_text
 from jounce.units.shown_units import ShownUnits
 
 if TYPE_CHECKING:

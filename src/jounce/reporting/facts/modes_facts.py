@@ -13,9 +13,9 @@ from typing_extensions import TypedDict
 from jounce.dynamics import Equilibrium, Linearization, Modes
 from jounce.dynamics.statics.independent_coordinates import COLUMNS
 from jounce.io.files.writing import replacing
-from jounce.reporting.numbers import time_text
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number, table, vector
+from jounce.units.instants import time_text
 
 
 class EquilibriumFacts(TypedDict):

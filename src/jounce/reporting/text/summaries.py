@@ -14,9 +14,9 @@ from jounce.dynamics.limits.trajectories import drives_note
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.load_changes import load_words
 from jounce.reporting.motion_ends import between_words, breaks_words, ends_words
-from jounce.reporting.numbers import interval_text, time_text
 from jounce.reporting.text.law_facts import law_words
 from jounce.trajectory import JointTrajectory
+from jounce.units.instants import interval_text, time_text
 
 if TYPE_CHECKING:
     import xarray
@@ -191,7 +191,7 @@ def torques_summary(
     lines = [
         f"{dataset.attrs['title']}: torques of {count(len(dataset.data_vars), 'moving joint')}{note} "
         f"({robot.name}, {trajectory.name})",
-        f"t = {instants[0]:g} s to {instants[-1]:g} s, {count(len(instants), 'instant')}",
+        f"t = {interval_text(instants[0], instants[-1])}, {count(len(instants), 'instant')}",
     ]
     lines.append(f"torques: {dataset.attrs['drives']}")
     lines += filter(None, [last_step_words(instants)])
@@ -213,7 +213,7 @@ def robot_motion_words(motion: RobotSimulation) -> list[str]:
     times, energy, steps = motion.time, motion.energy, count(len(motion.steps.start), "step")
     return [
         f"{motion.robot.name}: motion of {count(len(motion.robot.joint_names), 'moving joint')}",
-        f"t = {times[0]:g} s to {times[-1]:g} s, {count(len(times), 'instant')}, {steps}",
+        f"t = {interval_text(times[0], times[-1])}, {count(len(times), 'instant')}, {steps}",
         f"energy: {energy[0]:.9g} J at the start, {energy[-1]:.9g} J at the stop",
     ]
 

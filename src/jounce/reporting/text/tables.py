@@ -7,9 +7,9 @@ import math
 from collections.abc import Sequence
 
 from jounce.dynamics.limits.limit_report import LimitReport
-from jounce.reporting.numbers import time_text
 from jounce.reporting.peaks import Peak
 from jounce.reporting.text.summaries import Facts
+from jounce.units.instants import time_text
 
 
 @dataclasses.dataclass(frozen=True)

@@ -27,6 +27,7 @@ from jounce.planning.retiming.rates.rate_law import RateLaw
 from jounce.planning.retiming.rates.rate_motion import RateMotion
 from jounce.robot.model.links_and_joints import Limits
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FollowingMotion
+from jounce.units.instants import time_text
 
 SAMPLES = 2001
 SPEEDS = np.array([0.95, 1.0, 1.05])  # factors of the time law about which forces are expanded
@@ -154,7 +155,7 @@ class MechanismQuantities:
         """Return a description of a place on the path for messages."""
         values = self.motions(np.array([s]))[0, 0, : len(self.drivers)]
         listed = ", ".join(f"{name} = {x:.5g}" for name, x in zip(self.drivers, values, strict=True))
-        return f"t = {s:.6g} s of the mechanism ({listed})"
+        return f"t = {time_text(s)} s of the mechanism ({listed})"
 
     def ratios_of(self, progress: AbstractMotion, times: _Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return values, bounds and ratios of all quantities in a motion, from a solution without expansions."""

@@ -1,9 +1,9 @@
-"""Numbers as text for readers."""
+"""Instants as text for readers."""
 
 LATE = 1e4  # s; later instants have decimals, as significant digits would not tell them apart
 
 
-def time_text(time: float, digits: int = 6) -> str:
+def time_text(time: int | float, digits: int = 6) -> str:
     """Return the text of an instant, s: significant digits, or for late ones, as of a clock, three decimals.
 
     Examples
@@ -14,7 +14,7 @@ def time_text(time: float, digits: int = 6) -> str:
     return f"{time:.{digits}g}" if not abs(time) >= LATE else f"{time:.3f}".rstrip("0").rstrip(".")
 
 
-def interval_text(start: float, stop: float) -> str:
+def interval_text(start: int | float, stop: int | float) -> str:
     """Return the text of the ends of a time interval, s.
 
     Examples
