@@ -224,6 +224,16 @@ class TestEnds:
         found = jn.solve(made, [0.0, 1.0, 2.1, 3.1], order=2, strict=False)
         assert found.status.tolist() == [0, 0, int(Status.END_OF_CURVE), int(Status.NOT_REACHED)]
 
+    @pytest.mark.parametrize("excess", [1e-5, 1e-7])
+    def test_a_short_excursion_beyond_an_end_between_the_samples_of_a_step_is_found(self, excess):
+        """The turning point of -a cos(pi t + 0.1) is beyond s = 1 for a few milliseconds or less."""
+        made = bead(HILL, [-0.9, 0.081], law=f"-(1 + {excess})*cos(pi*t + 0.1)", start=-0.9)
+        found = jn.solve(made, [0.2, 0.6, 1.0, 1.4], order=2, strict=False)
+        assert found.status.tolist() == [0, 0, int(Status.END_OF_CURVE), int(Status.NOT_REACHED)]
+        assert found.faults[2] == "joints.track at its end s = 1"
+        inside = bead(HILL, [-0.9, 0.081], law="-cos(pi*t + 0.1)", start=-0.9)
+        assert not jn.solve(inside, [0.2, 0.6, 1.0, 1.4], order=2).status.any()
+
     def test_a_start_beyond_an_end_is_reported_before_anything_is_computed(self):
         with pytest.raises(jn.errors.MechanismError, match="between the ends of the curve, -1 and 1") as caught:
             jn.solve(bead(HILL, [0.5, 0.02], law="0.5", start=3.0), [0.0, 1.0])

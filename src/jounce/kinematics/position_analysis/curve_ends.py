@@ -1,7 +1,7 @@
 """Ends of open curves: a motion stops where a point reaches the end of its curve."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 from jaxtyping import Float
@@ -117,7 +117,8 @@ def _first_excess(path: FollowedPath, ends: CurveEnds) -> tuple[float, bool] | N
     def positions(instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "component 1 time"]:
         return attitudes_between(times, whole, instants)
 
-    instants = within_steps(times, SAMPLES)
+    samples = within_steps(times, SAMPLES)
+    instants = np.union1d(samples, _peaks(lambda now: shared.excess(positions(now)), samples))
     beyond = shared.excess(positions(instants)) > 0
     if not beyond.any():
         return None
@@ -129,3 +130,19 @@ def _first_excess(path: FollowedPath, ends: CurveEnds) -> tuple[float, bool] | N
         low, high = (low, middle) if out else (middle, high)
     value = float(positions(np.array([high]))[ends.component, 0, 0]) / ends.unit
     return high, value > ends.high
+
+
+def _peaks(
+    excess: Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, " time"]], samples: Float[np.ndarray, " time"]
+) -> Float[np.ndarray, " peak"]:
+    """Return the instants of the peaks between samples that may go beyond an end, by ternary search."""
+    values = excess(samples)
+    before, middle, after = values[:-2], values[1:-1], values[2:]
+    rise = middle - np.minimum(before, after)  # a parabola through three samples rises an eighth of it above the middle
+    near = np.flatnonzero((middle >= before) & (middle >= after) & (middle <= 0) & (middle + rise > 0))
+    low, high = samples[near], samples[near + 2]
+    for _ in range(HALVINGS if near.size else 0):
+        third = (high - low) / 3
+        rising = excess(low + third) < excess(high - third)
+        low, high = np.where(rising, low + third, low), np.where(rising, high, high - third)
+    return 0.5 * (low + high)
