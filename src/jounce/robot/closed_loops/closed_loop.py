@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from jounce.base.shapes import ArrayLike
-from jounce.errors import JounceError, RobotError, check_name, flag
+from jounce.errors import AssemblyWarning, JounceError, RobotError, check_name, flag, warn_caller
 from jounce.forces import AbstractForce
 from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism, time_grid
@@ -16,6 +16,7 @@ from jounce.mechanism.resolve import resolve_motion
 from jounce.mechanism.time import TimeLike
 from jounce.rigid.inertia import vector_numbers
 from jounce.robot.closed_loops.closures import GivenCoordinates, Loops, given_coordinates
+from jounce.robot.closed_loops.loop_following import drawn_position, position_at
 from jounce.robot.closed_loops.mechanism_parts import RobotParts, on_body
 from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.trajectory.joint_trajectory import JointTrajectory
@@ -172,13 +173,24 @@ def _closed_start(
 ) -> np.ndarray:
     """Return start coordinates at which the loops are closed, in the assembly in which the robot is drawn, if in one.
 
-    The driven joints move from the drawn pose to the start values of their laws.
+    The driven joints move from the drawn pose to the start values of their laws. If they cannot, a warning says so.
     """
-    if drawn:
-        reached = loops.followed(given_coordinates(robot, None), start, free)
-        if reached is not None:
-            return reached
-    return loops.closed(start, free)
+    position = drawn_position(loops, given_coordinates(robot, None), free) if drawn else None
+    if position is None:
+        return loops.closed(start, free)
+    reached = position_at(loops, position, start, free)
+    if reached is not None:
+        return reached
+    closed = loops.closed(start, free)
+    driven = ", ".join(name for name, own in zip(robot.joint_names, free, strict=True) if not own)
+    warn_caller(
+        AssemblyWarning(
+            f"{robot.name}: the loops, which the file draws closed, may start in another assembly: they could not be "
+            f"kept closed while the driven joints ({driven}) moved from there to their start; give coordinates q of "
+            "the other joints near those wanted, or start the drives nearer to the pose drawn"
+        )
+    )
+    return closed
 
 
 def body_point(robot: AbstractRobot, link: str, point: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[str, np.ndarray]:

@@ -37,10 +37,6 @@ GivenCoordinates = TypeAliasType("GivenCoordinates", Mapping[str, float] | Array
 
 RANK_TOLERANCE = 1e-5  # rad, or sizes of the robot: files give axes with six digits
 MAX_STEPS = 100
-DRAWN = 0.05  # rad, or sizes of the robot: a pose is drawn closed if closing its loops moves no coordinate by more
-STRIDE = 0.1  # rad, or sizes of the robot: largest step of the driven joints
-STRAY = 0.3  # fraction of a step: a larger distance from the predicted position may lead to another assembly
-SHORTEST = 1e-4  # fraction of the largest step
 SWAY = 0.05  # rad, or sizes of the robot: distance of a position in general from the one given
 
 
@@ -216,42 +212,9 @@ class Loops:
         self._check_closed(q)
         return q
 
-    def followed(
-        self, q: Float[np.ndarray, " joint"], target: Float[np.ndarray, " joint"], free: np.ndarray
-    ) -> Float[np.ndarray, " joint"] | None:
-        """Return the coordinates that the free joints reach from q as the others move straight to a target.
-
-        Small steps along the velocities keep the loops in one assembly. The result is None if the loops are open at q
-        or cannot be kept closed on the way.
-        """
-        try:
-            position = self.closed(q, free)
-        except RobotError:
-            return None
-        if np.abs((position - q) / self.scale).max(initial=0.0) > DRAWN:
-            return None
-        lead = np.where(free, 0.0, (target - q) / self.scale)
-        length = float(np.abs(lead).max(initial=0.0))
-        share, most = 0.0, min(STRIDE / max(length, 1e-300), 1.0)
-        step = most
-        while share < 1.0:
-            part = min(step, 1.0 - share)
-            slopes = np.concatenate([w @ s for w, s in zip(self.wrenches, self.gaps(position)[1], strict=True)])
-            change = part * lead
-            change[free] = np.linalg.lstsq(slopes[:, free], -slopes @ change, rcond=RANK_TOLERANCE)[0]
-            predicted = position + self.scale * change
-            try:
-                corrected = self.closed(predicted, free)
-                deviation = np.abs((corrected - predicted) / self.scale).max() / max(np.abs(change).max(), STRIDE / 10)
-            except RobotError:
-                corrected, deviation = position, np.inf
-            if deviation > STRAY:
-                step = part / 2
-                if step < SHORTEST * most:
-                    return None
-                continue
-            position, share, step = corrected, share + part, min(2 * part, most)
-        return np.where(free, position, target)
+    def opening(self, q: Float[np.ndarray, " joint"]) -> float:
+        """Return by how much the loops are open, rad or sizes of the robot."""
+        return max(np.abs(w @ g).max() for w, g in zip(self.wrenches, self.gaps(q)[0], strict=True))
 
     def _check_closed(self, q: np.ndarray) -> None:
         gaps, _ = self.gaps(q)
