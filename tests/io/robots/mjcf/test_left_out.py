@@ -276,3 +276,43 @@ def test_ranges_that_are_not_limits_of_a_joint_are_reported(tmp_path, joint, aft
     else:
         with pytest.warns(jn.errors.RobotWarning, match=says):
             load_robot(path)
+
+
+def surface_moments(a, b, c, mass):
+    """Return the moments of inertia of a surface by quadrature over the cosine of the polar angle and around."""
+    z, weights = np.polynomial.legendre.leggauss(200)
+    turn = np.linspace(0.0, 2 * np.pi, 400, endpoint=False)
+    x, y = (np.sqrt(1 - z**2)[:, None] * part for part in (np.cos(turn), np.sin(turn)))
+    z = np.broadcast_to(z[:, None], x.shape)
+    area = weights[:, None] * np.sqrt((b * c * x) ** 2 + (a * c * y) ** 2 + (a * b * z) ** 2)
+    squares = np.array([(area * (length * part) ** 2).sum() for length, part in ((a, x), (b, y), (c, z))]) / area.sum()
+    return mass * (squares.sum() - squares)
+
+
+SHELL = '<geom {} type="ellipsoid" size="{} {} {}" mass="3"/>'
+
+
+@pytest.mark.parametrize(
+    "size, told", [((0.1, 0.1, 1.0), True), ((1.0, 1.0, 0.1), True), ((0.1, 0.1, 0.1), False), (None, False)]
+)
+def test_shells_of_ellipsoids_are_as_mujoco_has_them_and_named(tmp_path, size, told):
+    """The values are those that MuJoCo simulates; they differ from those of the surface where the warning says so."""
+    shape = SHELL.format('shellinertia="true"', *size) if size else SHELL.format("", 0.1, 0.2, 0.3)
+    path = tmp_path / "shell.xml"
+    path.write_text(f'<mujoco><worldbody>\n<body name="egg"><joint/>\n{shape}</body></worldbody></mujoco>')
+    if told:
+        with pytest.warns(
+            jn.errors.RobotWarning,
+            match=r"ellipsoids are those of MuJoCo, which are up to 13 percent wrong: egg \(line 3\); corr",
+        ):
+            robot = load_robot(path)
+        with pytest.raises(RobotFileError, match=r"line 3, links\.egg\.shellinertia: .* give the body an <inertial>"):
+            load_robot(path, strict=True)
+    else:
+        robot = load_robot(path, strict=True)
+    moments = np.sort(np.linalg.eigvalsh(robot.links["egg"].inertia.tensor))
+    model = mujoco.MjModel.from_xml_path(str(path))
+    np.testing.assert_allclose(moments, np.sort(model.body_inertia[1]), rtol=1e-9)
+    if size:
+        off = np.abs(moments / np.sort(surface_moments(*size, 3.0)) - 1).max()
+        assert 0.08 < off < 0.135 if told else off < 2e-5

@@ -119,8 +119,10 @@ def test_rotors_of_transmissions_are_armature_as_drake_reads_them(tmp_path, roto
     """Reflected inertia is rotor inertia times the square of the gear ratio, which is 1 unless given."""
     more = ""
     for inertia, ratio in rotors:
-        gear = "" if ratio is None else f'<drake:gear_ratio value="{ratio}"/>'
-        parts = f'<drake:rotor_inertia value="{inertia}"/>{gear}<mechanicalReduction>3</mechanicalReduction>'
+        gear = (
+            "" if ratio is None else f'<drake:gear_ratio value="{ratio}"/><mechanicalReduction>3</mechanicalReduction>'
+        )
+        parts = f'<drake:rotor_inertia value="{inertia}"/>{gear}'
         more += ROTOR.format('<joint name="j"/>', parts)
     robot = load_robot(write(tmp_path, more), strict=True)
     reflected = sum(inertia * (ratio or 1) ** 2 for inertia, ratio in rotors)
@@ -143,6 +145,52 @@ def test_rotors_that_cannot_be_are_refused(tmp_path, joint, parts, name):
     with pytest.raises(RobotFileError) as caught:
         load_robot(write(tmp_path, ROTOR.format(joint, parts)))
     assert (caught.value.name, caught.value.line) == (name, 4)
+
+
+REDUCTION = "<mechanicalReduction>50</mechanicalReduction>"
+OF_ROTOR = '<drake:rotor_inertia value="2e-3"/>'
+
+
+@pytest.mark.parametrize(
+    "joint, actuator",
+    [('<joint name="j"/>', OF_ROTOR + REDUCTION), (f'<joint name="j">{REDUCTION}</joint>', OF_ROTOR)],
+)
+def test_a_reduction_that_a_rotor_does_not_count_with_is_reported(tmp_path, joint, actuator):
+    """Without a rotor a reduction says nothing about the joint; with one, Drake's ratio counts, and is 1 if missing."""
+    path = write(tmp_path, ROTOR.format(joint, actuator))
+    read_with_warning(path, r"<mechanicalReduction> of transmissions with rotors, .*: t \(line 4\)")
+    with pytest.raises(RobotFileError, match=r"line 4, transmissions\.t\.mechanicalReduction: give <drake:gear_ratio>"):
+        load_robot(path, strict=True)
+    load_robot(write(tmp_path, ROTOR.format(joint, actuator.replace(OF_ROTOR, ""))), strict=True)
+    load_robot(write(tmp_path, ROTOR.format(joint, actuator).replace("50", "1")), strict=True)
+
+
+def control(interface, **ends):
+    params = "".join(f'<param name="{key}">{value}</param>' for key, value in ends.items())
+    command = f'<command_interface name="{interface}">{params}</command_interface>'
+    return f'<ros2_control name="c"><joint name="j">{command}</joint></ros2_control>'
+
+
+@pytest.mark.parametrize(
+    "interface, ends, says",
+    [
+        ("position", {"min": -3, "max": 2.5}, r"j position max 2\.5 \(line 4\); make"),
+        ("position", {"min": "-2.5", "max": 4}, r"j position min -2\.5 \(line 4\); make"),
+        ("velocity", {"min": -1, "max": 0.5}, r"j velocity max 0\.5 \(line 4\); make"),
+        ("effort", {"max": 0.1}, r"j effort max 0\.1 \(line 4\); make"),
+        ("position", {"min": -3, "max": 3}, None),
+        ("velocity", {"min": -2, "max": 2, "initial": 0.1}, None),
+        ("voltage", {"max": 0.1}, None),
+        ("position", {"min": "${low}"}, None),
+    ],
+)
+def test_limits_of_ros2_control_that_are_tighter_are_reported(tmp_path, interface, ends, says):
+    """The range of the joint is from -3 to 3 rad, its velocity and effort 1: controllers keep the tighter limits."""
+    path = write(tmp_path, control(interface, **ends))
+    if says is None:
+        load_robot(path, strict=True)
+    else:
+        read_with_warning(path, r"limits of <ros2_control> that are tighter than <limit>: " + says)
 
 
 def test_a_rotor_of_a_joint_of_several_coordinates(tmp_path):

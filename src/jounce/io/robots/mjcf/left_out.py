@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jounce.io.robots.elements.faults import JOINT_SPRINGS
+from jounce.errors import RobotFileError
+from jounce.io.robots.elements.faults import JOINT_SPRINGS, Faults
 from jounce.io.robots.mjcf.drives import single_spring, works
 from jounce.io.robots.mjcf.files import line_of
 
@@ -28,6 +29,9 @@ OF_DRIVES = {
     "damping": "damping of actuators on tendons",
     "armature": "armature of actuators on tendons",
 }
+SHELLS = "the moments of inertia of shells of ellipsoids are those of MuJoCo, which are up to 13 percent wrong"
+OWN_INERTIA = "give the body an <inertial>, or read the file without strict to have the values of MuJoCo"
+ROUND = 0.01  # relative difference of half axes below which the moments are right to 2e-5
 FLUID_UNITS = {"density": "kg/m^3", "viscosity": "Pa s"}
 
 
@@ -118,6 +122,25 @@ def left_out_of_model(
     if fluid and passive and any(free[j] for k in heavy for j in _moved_by(model, k)):
         shown = " and ".join(f"{key} {value:g} {FLUID_UNITS[key]}" for key, value in fluid.items())
         yield SkippedPart(FLUID, shown, None, f"option.{next(iter(fluid))}", next(iter(fluid.values())))
+
+
+def note_shells(spec: Any, model: Any, mujoco: Any, bodies: Sequence[str], path: str, faults: Faults) -> None:
+    """Record the bodies with mass on the surface of ellipsoids other than spheres, whose moments are not right.
+
+    Raises
+    ------
+    RobotFileError
+        If they are errors.
+    """
+    for shape in spec.geoms:
+        size = model.geom_size[shape.id]
+        ellipsoid = model.geom_type[shape.id] == int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
+        hollow = shape.typeinertia == mujoco.mjtGeomInertia.mjINERTIA_SHELL
+        if ellipsoid and hollow and np.ptp(size) > ROUND * size.max():
+            name = bodies[int(model.geom_bodyid[shape.id])]
+            location = {"path": path, "line": line_of(shape.info), "name": f"links.{name}.shellinertia"}
+            error = RobotFileError(f"{SHELLS}; {OWN_INERTIA}", **location, value=size.tolist())
+            faults.add(SHELLS, name, error)
 
 
 def _moved_by(model: Any, body: int) -> Iterable[int]:

@@ -19,7 +19,7 @@ from jounce.io.robots.elements.followers import with_room
 from jounce.io.robots.elements.xml_elements import Element
 from jounce.io.robots.mjcf.drives import Drives, works
 from jounce.io.robots.mjcf.files import check_assets, check_copies, included, line_of, quiet_mujoco
-from jounce.io.robots.mjcf.left_out import SkippedPart, left_out_of_model, left_out_of_spec
+from jounce.io.robots.mjcf.left_out import SkippedPart, left_out_of_model, left_out_of_spec, note_shells
 from jounce.io.robots.mjcf.ties import NO_CLOSURE, JointRelations, linear_tendons, tied_tendons
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model.couplings import Coupling
@@ -233,6 +233,7 @@ class _Reader:
             if line is not None:
                 self.lines[name] = line
             self.faults.leave_out(heading, shown, self.error(left_out(heading), name, value=value))
+        note_shells(self.spec, self.model, self.mujoco, self.bodies, self.root.path, self.faults)
 
     def _tie(self) -> None:
         """Read the equalities: ties between joints, and closures of loops."""

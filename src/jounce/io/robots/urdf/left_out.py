@@ -31,6 +31,8 @@ INTO_LINKS = "inertia and poses that <gazebo> gives links"
 INTO_JOINTS = "axes, dynamics and poses that <gazebo> gives joints"
 WEIGHT = "the weight of links that <gazebo> takes out of gravity, which other readers of URDF count"
 FORCE_ELEMENTS = "<force_element>, which is a force"
+REDUCTIONS = "<mechanicalReduction> of transmissions with rotors, which count with <drake:gear_ratio>, or 1 without it"
+CONTROL_LIMITS = "limits of <ros2_control> that are tighter than <limit>"
 QUATERNIONS = "quat_xyzw, which the version of this file does not have"
 LINK_PARTS = ("inertial", "mass", "inertia", "pose")
 JOINT_PARTS = ("axis", "axis2", "dynamics", "mimic", "pose", "gearbox_ratio")
@@ -83,8 +85,8 @@ def check_version(root: Element, faults: Faults) -> None:
 def rotors(root: Element, faults: Faults) -> dict[str, float]:
     """Return the inertia of rotors seen at the joints, by name: ``rotor_inertia * gear_ratio^2`` of transmissions.
 
-    As in Drake, the ratio is 1 by default, and ``mechanicalReduction`` is ignored. Transmissions of several joints or
-    actuators are left out.
+    As in Drake, the ratio is 1 by default, and ``mechanicalReduction`` does not count; it is recorded where it would be
+    the ratio. Transmissions of several joints or actuators are left out.
     """
     inertias: dict[str, float] = {}
     joint_names = dict.fromkeys(element.attributes.get("name", "") for element in root.every("joint"))
@@ -98,6 +100,11 @@ def rotors(root: Element, faults: Faults) -> dict[str, float]:
             where = ("transmissions", name)
             inertia = rotor.number("value", *where, ROTOR)
             ratio = 1.0 if gear is None else gear.number("value", *where, RATIO)
+            if gear is None and (reduction := _reduction(transmission)) is not None:
+                message = f"give <drake:gear_ratio>, by the square of which the rotor counts; {LEAVE.format('it')}"
+                faults.leave_out(
+                    REDUCTIONS, name, reduction.error(message, *where, reduction.tag, value=reduction.content)
+                )
             if inertia < 0:
                 raise rotor.error("must be zero or greater", *where, ROTOR, value=inertia)
             if inertia == 0:
@@ -110,6 +117,12 @@ def rotors(root: Element, faults: Faults) -> dict[str, float]:
                 raise joints[0].error(no_such("joint", joint, joint_names), *where, "joint", value=joint)
             inertias[joint] = inertias.get(joint, 0.0) + inertia * ratio**2
     return inertias
+
+
+def _reduction(transmission: Element) -> Element | None:
+    """Return the reduction of a transmission that is not 1, of its actuator or its joint."""
+    parts = [part for holder in transmission.children for part in holder.every("mechanicalReduction")]
+    return next((part for part in parts if part.content_numbers(1, "transmissions") not in ([1.0], [-1.0])), None)
 
 
 def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]], faults: Faults) -> None:
@@ -148,7 +161,7 @@ def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]],
                 if part.tag in OTHER_ROTORS:
                     _leave(faults, ROTORS, element.attributes.get("name") or part.tag, part, LEAVE)
         elif element.tag == "ros2_control":
-            _note_control(element, elements, faults)
+            _note_control(element, elements, robot, faults)
         elif element.tag == "mujoco":
             _note_mujoco(element, faults)
 
@@ -167,13 +180,38 @@ def _note_dynamics(joint: Element, faults: Faults) -> None:
             faults.leave_out(heading, name, dynamics.error(left_out(heading), *where, value=value))
 
 
-def _note_control(control: Element, joints: Mapping[str, Element], faults: Faults) -> None:
-    """Record joints that follow others by a controller only."""
+def _note_control(control: Element, joints: Mapping[str, Element], robot: Robot, faults: Faults) -> None:
+    """Record joints that follow others by a controller only, and limits that a controller keeps."""
     for interface in control.every("joint"):
-        joint = joints.get(interface.attributes.get("name", ""))
+        name = interface.attributes.get("name", "")
+        joint = joints.get(name)
         for part in interface.every("param") if joint is not None and joint.first("mimic") is None else ():
             if part.attributes.get("name") == "mimic":
-                _leave(faults, PLUGINS, interface.attributes["name"], part, LEAVE)
+                _leave(faults, PLUGINS, name, part, LEAVE)
+        if name not in robot.joints:
+            continue
+        limits = robot.joints[name].limits
+        velocity, effort = ((None, None) if x is None else (-x, x) for x in (limits.velocity, limits.effort))
+        known = {"position": (limits.lower, limits.upper), "velocity": velocity, "effort": effort}
+        for command in interface.every("command_interface"):
+            ends = known.get(command.attributes.get("name", ""))
+            for part in command.every("param"):
+                if ends is not None and _is_tighter(part, ends):
+                    shown = f"{name} {command.attributes['name']} {part.attributes['name']} {part.content.strip()}"
+                    _leave(faults, CONTROL_LIMITS, shown, part, LEAVE)
+
+
+def _is_tighter(part: Element, ends: tuple[float | None, float | None]) -> bool:
+    """Return whether a parameter is the end of a range within given ends."""
+    key = part.attributes.get("name")
+    if key not in ("min", "max"):
+        return False
+    try:
+        value = float(part.content)
+    except ValueError:  # an expression of a controller
+        return False
+    lower, upper = (-math.inf if ends[0] is None else ends[0]), (math.inf if ends[1] is None else ends[1])
+    return value > lower if key == "min" else value < upper
 
 
 def _note_mujoco(element: Element, faults: Faults) -> None:
