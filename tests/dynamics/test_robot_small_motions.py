@@ -111,3 +111,10 @@ def test_a_robot_with_loops_has_the_stiffness_of_the_torques_that_hold_it():
     other = jn.linearize(robot, coordinates=["left_motor", "right_motor"])
     values = [np.sort(np.linalg.eigvals(np.linalg.solve(x.mass, x.stiffness)).real) for x in (small, other)]
     assert values[0].shape == values[1].shape == (2,)
+
+
+def test_what_no_joint_of_a_robot_balances_is_named_with_what_to_do():
+    links = [jn.Link("base"), jn.Link("wheel", jn.Inertia(1.0, tensor=[0.1, 0.1, 0.1]))]
+    robot = jn.Robot("hub", links, [jn.Joint("hub", "base", "wheel", axis=[0, 1, 0])])
+    with pytest.raises(jn.errors.SolveError, match=r"\(0, 0\.7, 0\) N m on wheel is balanced by nothing; .* \(hold\)"):
+        jn.equilibrium(robot, torques={"hub": 0.7})

@@ -135,8 +135,12 @@ def _check_determined(forces: MotionForces, name: str) -> None:
         reasons.append(
             "teeth press on either flank, which loads joints with friction: give gears without pressure_angle"
         )
-    if any(isinstance(group.element, SpinHold) for group in model.system.groups):
-        reasons.append("a body may spin about an axis of itself: hold it by a joint")
+    spinning = [group.element.bodies[0] for group in model.system.groups if isinstance(group.element, SpinHold)]
+    if spinning:
+        reasons.append(
+            f"nothing prescribes the spin of {' and '.join(spinning)}: put a universal joint in the place of a "
+            "spherical one"
+        )
     if reasons:
         raise UnsupportedError(
             f"the range of holding forces cannot be computed where {'; and '.join(reasons)}", name=name

@@ -206,6 +206,16 @@ def _posed(body: Body, pose: dict[str, Any]) -> Body:
     return dataclasses.replace(body, **changed, orientation=pose["orientation"].tolist())
 
 
+TO_BALANCE = (
+    "if a motor or a brake holds this body, give it a driver; otherwise check the signs and values of forces and "
+    "gravity, or place the bodies nearer to the position expected"
+)
+TO_BALANCE_ROBOTS = (
+    "name the joints that motors or brakes hold (hold), give their torques, check the direction of gravity and the "
+    "springs, or begin at other coordinates (q)"
+)
+
+
 @concrete
 def equilibrium(
     mechanism: Mechanism | Robot,
@@ -277,7 +287,7 @@ def equilibrium(
     if not result.balanced:
         message = (
             f"no equilibrium was found from the starting guess: where the search ended, {remains(result)} is balanced "
-            "by nothing; check forces and gravity, hold what is driven, or guess the bodies nearer to it"
+            f"by nothing; {TO_BALANCE_ROBOTS if robot else TO_BALANCE}"
         )
         raise SolveError(message, status=Status.NOT_CONVERGED)
     return equilibrium_of(result, start, of_robot=robot)

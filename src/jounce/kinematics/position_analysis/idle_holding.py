@@ -54,7 +54,7 @@ def idle_words(idle: IdleMotions, *, axes: bool = False) -> str:
 def warn_of_idle(idle: IdleMotions) -> None:
     """Warn once of the idle motions that are held."""
     message = (
-        f"nothing keeps these bodies from spinning about an axis of themselves, which moves nothing else: "
+        "nothing prescribes the spin of these bodies, which moves nothing else: "
         f"{idle_words(idle, axes=True)}; they are held by the least motion, and no output depends on it"
     )
     warn_caller(IdleMotionWarning(message))
@@ -80,8 +80,11 @@ def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable
                 idle = error.idle
             given: Any = dict(zip(("mechanism", "time"), arguments, strict=False)) | keywords
             if holds_tracer(given):  # a change of design may end an idle motion, and depend on its angle
-                message = f"these bodies may spin about themselves: {idle_words(idle)}; hold them by joints"
-                raise UnsupportedError(f"{message} where a motion is differentiated", name="mechanism")
+                message = (
+                    f"where a motion is differentiated, no body may spin freely, as do: {idle_words(idle, axes=True)}; "
+                    "drive the spin, or put a universal joint in the place of a spherical one"
+                )
+                raise UnsupportedError(message, name="mechanism")
             mechanism = with_idle_motions_held(given["mechanism"], idle)
             check: Any = functools.partial(check_independent, mechanism, idle, given.get("time"), solver())
             check()
@@ -152,9 +155,9 @@ def check_independent(
         size = np.maximum(np.abs(one), np.abs(other)).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
         difference = np.abs(one - other).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
         if not (difference <= DEPENDS * np.maximum(size, scale)).all():
-            bodies = idle_words(idle)
             message = (
-                f"depends on a motion that nothing prescribes: {bodies} may spin about an axis of itself, which moves "
-                "nothing else; drive it, hold it by a joint, or leave this output out"
+                f"depends on a spin that nothing prescribes: {idle_words(idle, axes=True)} may spin without moving "
+                "anything else; drive the spin, put a universal joint in the place of a spherical one, or leave this "
+                "output out"
             )
             raise MechanismError(message, name=f"outputs.{name}")
