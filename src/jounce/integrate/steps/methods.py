@@ -221,7 +221,7 @@ class Taylor(AbstractMethod):
     --------
     >>> import jounce as jn
     >>> jn.Taylor().expansion_order(1e-12)
-    21
+    23
     """
 
     order: int | None = field(static=True, default=None)
@@ -234,8 +234,8 @@ class Taylor(AbstractMethod):
         check_step(self.step)
 
     def expansion_order(self, tolerance: float) -> int:
-        """Return the given order, or that with the fewest terms for a unit of time at this tolerance."""
-        return self.order or min(max(round(-0.75 * math.log(tolerance)), 6), 28)
+        """Return the given order, or one that takes little time for a unit of time at this tolerance."""
+        return self.order or min(round(9.0 - 0.5 * math.log(tolerance)), 28)
 
     def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
         """Return the step at which the terms of the upper half of the orders predict the tolerated error."""
