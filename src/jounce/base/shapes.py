@@ -43,6 +43,8 @@ class Labeled(Protocol):
     def __array__(self, *args: Any, **options: Any) -> np.ndarray: ...
 
 
+_ARRAY = {np.ndarray}
+
 ArrayLike = TypeAliasType("ArrayLike", Numbers | Sequence | np.floating | np.integer | float | int | Labeled)
 """An object that can be converted to an array of numbers: an array, nested lists or tuples of numbers, a number."""
 
@@ -55,13 +57,13 @@ Refused = object
 
 def is_traced(values: Any) -> bool:
     """Return whether a pytree contains JAX tracers, whose values cannot be checked."""
-    leaves = jax.tree.leaves(values)
-    return not only_arrays(leaves) and any(isinstance(x, Tracer) for x in leaves)
+    return has_tracers(jax.tree.leaves(values))
 
 
-def only_arrays(leaves: Sequence[Any]) -> bool:
-    """Return whether all leaves are NumPy arrays, a fast check that none is a tracer."""
-    return set(map(type, leaves)) <= {np.ndarray}
+def has_tracers(leaves: Sequence[Any]) -> bool:
+    """Return whether some of the leaves of a pytree are JAX tracers, by their classes, which are few."""
+    kinds = set(map(type, leaves))
+    return kinds != _ARRAY and any(issubclass(kind, Tracer) for kind in kinds)
 
 
 def real_numbers(

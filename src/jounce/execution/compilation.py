@@ -10,7 +10,7 @@ import jax
 from jax.core import Tracer
 
 from jounce.base.jax_internals import runs_at_once
-from jounce.base.shapes import only_arrays
+from jounce.base.shapes import has_tracers
 from jounce.execution.device import on_processor
 from jounce.execution.translated import Translated, all_shaped
 from jounce.settings import check_process, under_own_settings
@@ -97,7 +97,7 @@ class ByXla:
         """Call the compiled function."""
         check_process()
         leaves = jax.tree.leaves((arguments, keywords))
-        traced = [] if only_arrays(leaves) else [leaf for leaf in leaves if isinstance(leaf, Tracer)]
+        traced = [leaf for leaf in leaves if isinstance(leaf, Tracer)] if has_tracers(leaves) else []
         whole = self.jitted if all(map(runs_at_once, traced)) else self._within
         return whole(*arguments, **keywords)
 
@@ -144,7 +144,7 @@ class Compiled:
         """Call the compiled function."""
         check_process()
         arguments, keywords, static, leaves, tree = self._parts(arguments, keywords)
-        if only_arrays(leaves) or not any(isinstance(leaf, Tracer) for leaf in leaves):
+        if not has_tracers(leaves):
             arrays = all_shaped(leaves)
             if (code := self._code(arrays, tree, static)) is not None:
                 return code(arrays)

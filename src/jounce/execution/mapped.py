@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from jounce.base.padding import padded
-from jounce.base.shapes import is_traced
+from jounce.base.shapes import has_tracers, is_traced
 from jounce.execution.backends import LLVM, xla_backend
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import LARGE, ByXla
@@ -271,7 +271,7 @@ class Mapped:
         """
         leaves, structure = jax.tree.flatten(shared)
         few, form = jax.tree.flatten(lanes)
-        if not is_traced([*leaves, *few]):
+        if not has_tracers([*leaves, *few]):
             arrays, parts = all_shaped(leaves), all_shaped(few)
             code = self.machine_code.program((arrays, structure), (parts, form), static, large=large)
             if code is not None:
@@ -304,9 +304,9 @@ class Mapped:
         """
         few = count <= FEWEST_TOGETHER
         lanes = lanes_of(np.arange(count if few else 1))
-        if is_traced(jax.tree.leaves((shared, lanes))):
-            return self.on_xla(shared, lanes_of(np.arange(count)), how=tuple(static.items())), xla_backend()
         program = self.program(shared, lanes, large=large, **static)
+        if program.backend != LLVM and is_traced((shared, lanes)):
+            return self.on_xla(shared, lanes_of(np.arange(count)), how=tuple(static.items())), xla_backend()
         if few:
             return program(lanes), program.backend
         widths = program.together(sum(np.size(x) for x in jax.tree.leaves(lanes)))

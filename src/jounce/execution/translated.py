@@ -16,7 +16,6 @@ import jax
 import numpy as np
 
 from jounce.base.activity import compiling
-from jounce.base.shapes import only_arrays
 from jounce.execution.backends import uses_machine_code, warn_of_missing
 from jounce.execution.background import ByKey
 from jounce.execution.llvm.modules import object_file
@@ -27,15 +26,16 @@ from jounce.execution.structure import UndescribedError, cache_key, settings
 from jounce.execution.traced_once import one_program
 
 Group = tuple[Sequence[np.ndarray | jax.ShapeDtypeStruct], Any]  # leaves of a tree, or their shapes, and its structure
+FLOAT = np.dtype(float)
+SHAPE = jax.ShapeDtypeStruct
 LITTLE = 20_000  # entries of all arguments: with more, even one call is worth optimization
 _thread = threading.local()
 
 
 def all_shaped(leaves: Sequence[Any]) -> list[Any]:
     """Return leaves as NumPy arrays; a `jax.ShapeDtypeStruct` stays unchanged."""
-    if only_arrays(leaves):
-        return list(leaves)
-    return [leaf if type(leaf) in (np.ndarray, jax.ShapeDtypeStruct) else np.asarray(leaf) for leaf in leaves]
+    array = np.ndarray
+    return [x if (kind := type(x)) is array or kind is SHAPE else np.asarray(x) for x in leaves]
 
 
 def traces_one_instant() -> bool:
@@ -113,7 +113,8 @@ class Translated:
         ones = tuple([(self._one(x.shape), x.dtype) for x in few])
         found_later = [name for name, value in static.items() if type(value) is WhenMade]
         matters, hasty = found_later or not self._single, is_in_haste()
-        indices: Any = {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim} if matters else {}
+        others = [(k, x) for k, x in enumerate(arrays) if x.dtype is not FLOAT] if matters else ()
+        indices: Any = {k: x for k, x in others if x.dtype.kind in "iu" and x.ndim}
         known = tuple([x.tobytes() for x in indices.values()])
         static_key = tuple([(name, type(value), value) for name, value in static.items()])
         key = structure, form, kinds, ones, known, large, hasty, static_key, settings()

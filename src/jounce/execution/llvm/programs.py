@@ -61,6 +61,31 @@ class Layout:
         return [np.ndarray(*kind, memory, index) for kind, index in self._places]
 
 
+class Block:
+    """The arguments and results of calls in one block of memory, with their addresses before them.
+
+    Parameters
+    ----------
+    given, results : sequence of tuple
+        Shapes and types of the arguments and of the results.
+    """
+
+    def __init__(self, given: Sequence[tuple[tuple[int, ...], Any]], results: Sequence[tuple[tuple[int, ...], Any]]):
+        self._addresses = 8 * (len(given) + len(results))  # bytes
+        self._given = Layout(given, self._addresses)
+        self._results = Layout(results, self._given.end)
+        self._offsets = np.concatenate([self._given.offsets, self._results.offsets])
+
+    def results(self, run: MachineCode, given: Sequence[np.ndarray], lanes: int) -> list[np.ndarray]:
+        """Return the results of machine code for arguments of the shapes and types of the block."""
+        memory = lend(self._results.end)
+        first = address_of(memory)
+        np.add(self._offsets, first, out=memory[: self._addresses].view(np.int64))
+        self._given.put(memory, given)
+        run(first, lanes)
+        return self._results.views(memory)
+
+
 class Single:
     """Machine code of a function, run for one instant.
 
@@ -75,19 +100,11 @@ class Single:
     def __init__(self, binary: bytes, given: Any, results: Any):
         self._run = MachineCode(binary)
         leaves, (result, self._structure) = jax.tree.leaves(given), jax.tree.flatten(results)
-        self._addresses = 8 * (len(leaves) + len(result))  # bytes
-        self._given = Layout([(x.shape, x.dtype) for x in leaves], self._addresses)
-        self._results = Layout([(x.shape, x.dtype) for x in result], self._given.end)
-        self._offsets = np.concatenate([self._given.offsets, self._results.offsets])
+        self._block = Block([(x.shape, x.dtype) for x in leaves], [(x.shape, x.dtype) for x in result])
 
     def __call__(self, given: Sequence[np.ndarray]) -> Any:
         """Return the results for the leaves of the arguments, which have the shapes and types of the program."""
-        memory = lend(self._results.end)
-        first = address_of(memory)
-        np.add(self._offsets, first, out=memory[: self._addresses].view(np.int64))
-        self._given.put(memory, given)
-        self._run(first, 1)
-        return jax.tree.unflatten(self._structure, self._results.views(memory))
+        return jax.tree.unflatten(self._structure, self._block.results(self._run, given, 1))
 
 
 class Program:
@@ -113,6 +130,7 @@ class Program:
         leaves, self._structure = jax.tree.flatten(results)
         self._results = [(leaf.shape[:-1], leaf.dtype) for leaf in leaves]
         self.width, self._rows = vector_width(), rows
+        self._vector = Block(self._shared + self._many(self._lanes, self.width), self._many(self._results, self.width))
         # programs that differ only in unread arguments have the same code
         read = repr((self._shared, self._lanes, self._results)).encode()
         self.name = f"jounce_{hashlib.sha256(binary + read).hexdigest()[:32]}"
@@ -133,13 +151,17 @@ class Program:
         """
         axis = 0 if self._rows else -1
         count = lanes[0].shape[axis]
-        total = max(count, self.width)
+        first = slice(count) if self._rows else (..., slice(count))
         self._check(shared, lanes, count)
-        if total > count:
-            lanes = [padded(x, total, axis) for x in lanes]
-        given = [np.ascontiguousarray(x) for x in lanes]
-        shapes = [((total, *shape) if self._rows else (*shape, total), dtype) for shape, dtype in self._results]
-        result = [np.empty(*shape) for shape in shapes]
+        if 0 < count <= self.width:  # the last instant again in the other lanes
+            indices = np.minimum(np.arange(self.width), count - 1)
+            given = [*shared, *(x.take(indices, axis) for x in lanes)]
+            # copies, as results may be kept for longer than the arguments in their block
+            result = [x[first].copy() for x in self._vector.results(self._run, given, self.width)]
+            return jax.tree.unflatten(self._structure, result)
+        total = max(count, self.width)
+        given = [np.ascontiguousarray(padded(x, total, axis)) for x in lanes]
+        result = [np.empty(*kind) for kind in self._many(self._results, total)]
         memory = np.empty(self._layout.end, np.uint8)
         self._layout.put(memory, shared)
         arrays = [*given, *result]
@@ -157,7 +179,7 @@ class Program:
                     self._run((ctypes.c_void_p * len(here))(*here), stop - start)
 
             list(each(run, range(parts)))
-        return jax.tree.unflatten(self._structure, [x[:count] if self._rows else x[..., :count] for x in result])
+        return jax.tree.unflatten(self._structure, [x[first] for x in result])
 
     def rounds(
         self,
@@ -211,8 +233,11 @@ class Program:
 
     def _check(self, shared: Sequence[Any], lanes: Sequence[Any], count: int) -> None:
         """Raise ValueError unless the arrays, with `count` instants, have the shapes and types of the program."""
-        many = [((count, *shape) if self._rows else (*shape, count), dtype) for shape, dtype in self._lanes]
-        _agree([*shared, *lanes], [*self._shared, *many])
+        _agree([*shared, *lanes], [*self._shared, *self._many(self._lanes, count)])
+
+    def _many(self, kinds: Sequence[tuple[tuple[int, ...], Any]], count: int) -> list[tuple[tuple[int, ...], Any]]:
+        """Return the shapes and types of arrays of an instant for a number of instants."""
+        return [((count, *shape) if self._rows else (*shape, count), dtype) for shape, dtype in kinds]
 
 
 def _agree(arrays: Sequence[Any], expected: Sequence[tuple[tuple[int, ...], Any]]) -> None:
