@@ -8,7 +8,8 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.errors import MechanismError
-from jounce.mechanism import Mechanism
+from jounce.mechanism import Mechanism, Model
+from jounce.mechanism.building.contents import owned_arrays
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import along_instances, resolved
 from jounce.mechanism.system import POSITION_COMPONENTS
@@ -73,6 +74,17 @@ def required_masses(mechanism: Mechanism, what: str = "energies") -> Masses:
     if len(known) == 2 and not any(map(np.any, known)):
         raise MechanismError(f"no body has a mass; {what} need some", name="bodies")
     return masses
+
+
+def kept_masses(model: Model, mechanism: Mechanism, what: str) -> Masses:
+    """Return the masses of all bodies, as `required_masses` does, kept with the model of the mechanism.
+
+    A stored model is that of a mechanism with the same values (`mechanism.building.contents`), masses among them.
+    """
+    kept = vars(model)
+    if "masses" not in kept:
+        kept["masses"] = owned_arrays(required_masses(mechanism, what))
+    return kept["masses"]
 
 
 def check_loads(mechanism: Mechanism, name: str = "bodies") -> None:

@@ -110,7 +110,9 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
     """
     *_, bodies, lanes = state.position.shape
     size, columns = equations.system.shape
-    series = state.map(lambda known: np.concatenate([known[None], np.zeros((order, *known.shape))]))
+    series = state.map(lambda known: np.zeros((order + 1, *known.shape)))
+    for whole, known in zip(series, state, strict=True):
+        whole[0] = known
     expansion = Expansion(series, np.zeros((1, columns // bodies, bodies, lanes)), np.zeros((1, size, lanes)))
     nothing, none = np.zeros(time.shape), np.zeros(time.shape, int)
     return IntegratorState(

@@ -170,7 +170,8 @@ def simulate(
     _check_ends(start, first)
     watched = [*events, *_events_at_ends(start)]
     detectors = [_detector_of(event, mechanism, start) for event in watched]
-    prepare(start.model)
+    if start.model.system.rank is not None:  # otherwise the programs are those asked for before assembly
+        prepare(start.model)
     run = MechanismRun(start, method, limits, detectors, watched=bool(events))
     with Count("simulating", report=progress) as tell:
         run.go(instants, tell)

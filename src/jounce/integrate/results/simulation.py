@@ -1,6 +1,6 @@
 """The result of a simulation: a motion with dense output, energy, drift and events."""
 
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import jax.numpy as jnp
@@ -89,7 +89,6 @@ class Simulation(Motion):
         outputs, levels = start.model.system.outputs, {"order": derivatives_of_motion(mechanism, order)}
         outcome, backend = expanded.at_instants((start.equations, outputs), lanes_of, len(instants), **levels)
         state, self._angles, outputs_found = outcome
-        coordinates = pose_coordinates(state)
         groups = tuple(
             self._counted(group, series, instants) for group, series in zip(outputs, outputs_found, strict=True)
         )
@@ -104,7 +103,9 @@ class Simulation(Motion):
             reason = ending[0] if ending[0] == Status.LOCKED else Status.INADMISSIBLE
             status[lost], faults[int(np.argmax(lost))] = int(reason), ending[1]
         values = tuple(plain_derivatives(np.asarray(series)) for series in groups)
-        super().__init__(mechanism, start.model, instants, order, (coordinates, values), status, faults)
+        super().__init__(
+            mechanism, start.model, instants, order, (partial(pose_coordinates, state), values), status, faults
+        )
         self.backend = joined({backend, *filter(None, steps_backend.split(", "))})
 
     def __repr__(self) -> str:
@@ -252,11 +253,13 @@ def chosen_instants(time: ArrayLike, error: type[JounceError]) -> Float[np.ndarr
 
 def steps_of(dense: DenseOutput | RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return whether the steps reach each instant, and the index of its step."""
-    direction = 1.0 if dense.length[0] >= 0 else -1.0
-    rounding = 1e-14 * max(abs(dense.start[0]), abs(dense.end))
-    reached = (direction * (instants - dense.start[0]) >= -rounding) & (direction * (instants - dense.end) <= rounding)
-    chosen = np.searchsorted(direction * dense.start, direction * instants, side="right") - 1
-    return reached, np.maximum(np.minimum(chosen, len(dense.start) - 1), 0)
+    start, end = dense.start, dense.end
+    if dense.length[0] < 0:
+        start, end, instants = -start, -end, -instants
+    rounding = 1e-14 * max(abs(start.item(0)), abs(end))
+    reached = (instants - start[0] >= -rounding) & (instants - end <= rounding)
+    chosen = np.searchsorted(start, instants, side="right") - 1
+    return reached, np.maximum(np.minimum(chosen, len(start) - 1), 0)
 
 
 def status_of(
@@ -267,8 +270,10 @@ def status_of(
 ) -> tuple[Int[np.ndarray, " time"], dict[int, str]]:
     """Return the status of instants, with the reason of the end at the first one beyond the last step, and faults."""
     status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
+    if ending[0] == Status.OK:
+        return status, {}
     beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
-    if ending[0] == Status.OK or not beyond.size:
+    if not beyond.size:
         return status, {}
     status[beyond[0]] = int(ending[0])
     return status, {int(beyond[0]): ending[1]}
