@@ -76,15 +76,15 @@ def required_masses(mechanism: Mechanism, what: str = "energies") -> Masses:
     return masses
 
 
-def kept_masses(model: Model, mechanism: Mechanism, what: str) -> Masses:
+def stored_masses(model: Model, mechanism: Mechanism, what: str) -> Masses:
     """Return the masses of all bodies, as `required_masses` does, kept with the model of the mechanism.
 
     A stored model is that of a mechanism with the same values (`mechanism.building.contents`), masses among them.
     """
-    kept = vars(model)
-    if "masses" not in kept:
-        kept["masses"] = owned_arrays(required_masses(mechanism, what))
-    return kept["masses"]
+    values = vars(model)
+    if "masses" not in values:
+        values["masses"] = owned_arrays(required_masses(mechanism, what))
+    return values["masses"]
 
 
 def check_loads(mechanism: Mechanism, name: str = "bodies") -> None:

@@ -36,6 +36,25 @@ def test_without_a_condition_the_guess_is_kept_and_the_body_rests():
     assert np.allclose([*state.spin.ravel(), *state.velocity.ravel()], 0.0, atol=1e-14)
 
 
+def test_masses_are_those_of_now_where_the_model_is_stored():
+    """Values that change between calls, and in place, are read; nobody writes to masses that are kept."""
+    center = np.array([0.5, 0.0])
+    rod = jn.Body([0, 0], mass="m", inertia=0.1, center_of_mass=center)
+    mechanism = jn.Mechanism(
+        space="planar",
+        bodies={"rod": rod},
+        joints={"O": planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+        parameters={"m": 1.0},
+    )
+    object.__setattr__(rod, "center_of_mass", center)  # the array itself
+    given = [(1.0, 0.5), (1.0, 0.5), (1.0, 0.5), (2.0, 0.5), (1.0, 0.5), (1.0, 0.7), (1.0, 0.5), (2.0, 0.7)]
+    for mass, at in given * 2:
+        center[0] = at
+        masses = consistent_start(dataclasses.replace(mechanism, parameters={"m": mass}), 0.0).equations.masses
+        assert (masses.mass[1, 0], masses.center[0, 1, 0]) == (mass, at)
+        assert not any(part.flags.writeable or np.shares_memory(part, center) for part in masses)
+
+
 STARTS = ["simple_pendulum", "double_pendulum", "andrews", "sprung_four_bar", "flyball_governor"]
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in (*STARTS[2:], "spatial_slider_crank_free")]
 

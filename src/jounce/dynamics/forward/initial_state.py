@@ -15,7 +15,7 @@ from jounce.dynamics.forward.accelerations import Equations, Instants, State
 from jounce.dynamics.forward.saddle_fronts import SaddleFronts
 from jounce.dynamics.forward.saddle_point import even_scale
 from jounce.dynamics.friction.coupling import check_unique_pressing
-from jounce.dynamics.masses import Gravity, Masses, gravity_of, kept_masses
+from jounce.dynamics.masses import Gravity, Masses, gravity_of, stored_masses
 from jounce.errors import AssemblyError, MechanismError, MobilityError
 from jounce.execution.compilation import compiled
 from jounce.execution.device import resident
@@ -96,7 +96,7 @@ def consistent_start(
     """
     mechanism = chosen(mechanism, instant)
     model, gravity, state, together = build(mechanism, initial=True), gravity_of(mechanism), None, None
-    masses = kept_masses(model, mechanism, "the equations of motion")
+    masses = stored_masses(model, mechanism, "the equations of motion")
     exact = True  # whether the state satisfies the rates of the rows that remain without the initial conditions
     if built is not None:
         built(model)

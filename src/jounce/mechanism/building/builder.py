@@ -333,7 +333,7 @@ def _layout(
 
 def _row_count(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> int:
     leaves, structure = jax.tree.flatten(law_left_out(group))
-    poses = tuple([(name, np.shape(x)) for name, x in guess.items()])
+    poses = tuple([(name, np.shape(x)) for name, x in sorted(guess.items())])  # JAX sorts names, too
     return _row_count_of(structure, tuple(map(np.shape, leaves)), pose_type, poses)
 
 
