@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from os import PathLike, fspath
 from pathlib import Path
 
-from jounce.errors import RobotFileError
+from jounce.errors import RobotFileError, UnitWarning, warn_caller
 from jounce.io.files import ROBOT_FILES
 from jounce.io.files.reading import check_allowed
 from jounce.io.robots.closure_files import with_closures
-from jounce.io.robots.elements.faults import MACROS, Faults
+from jounce.io.robots.elements.faults import FEW, MACROS, Faults
 from jounce.io.robots.elements.xml_elements import Element, read_markup
 from jounce.io.robots.mjcf.reader import read_mjcf
 from jounce.io.robots.sdf.reader import read_sdf
@@ -22,6 +22,7 @@ from jounce.settings import under_own_settings
 SHAPES = ("visual", "collision")
 XACRO_SOURCE = ("xacro:include", "xacro:macro", "xacro:property", "xacro:arg", "xacro:if", "xacro:unless")
 OLD_XACRO = ("include", "macro", "property")  # tags of xacro before it had a prefix
+LEAST_DEGREES = 45  # rad, more than seven turns: smaller ranges are not taken for degrees
 XACRO = "is a xacro file, which must first be expanded to a URDF; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
@@ -120,11 +121,30 @@ def load_robot(
         raise root.error(message, value=f"<{root.tag}>")
     if (warning := faults.warning()) is not None:
         warnings.warn(warning, stacklevel=2)
+    _warn_of_degrees(robot, name)
     if closures is not None:
         robot = with_closures(robot, closures)
     if floating_base is False:
         return robot
     return _released(robot, "ZYX" if floating_base is True else floating_base, name)
+
+
+def _warn_of_degrees(robot: Robot, path: str) -> None:
+    """Warn of joints that turn by ranges as people write them in degrees, more than seven turns in fives."""
+    likely = []
+    for joint in robot.joints.values():
+        ends = [joint.limits.lower, joint.limits.upper]
+        if not joint.turning or None in ends:
+            continue
+        lower, upper = (float(end) for end in ends if end is not None)
+        fives = lower % 5 == 0 and upper % 5 == 0 and (lower % 50 != 0 or upper % 50 != 0)  # 100 stands for no limit
+        if fives and LEAST_DEGREES <= max(abs(lower), abs(upper)) <= 360:
+            likely.append(f"{joint.name} ({lower:g} to {upper:g})")
+    if likely:
+        more = len(likely) - FEW
+        listed = ", ".join(likely if more <= 0 else [*likely[:FEW], f"and {more} more"])
+        message = f"these ranges of joints look like degrees, and are read as radians: {listed}; write radians"
+        warn_caller(UnitWarning(f"{path}: {message}"))
 
 
 def _check_expanded(root: Element, faults: Faults) -> None:

@@ -193,6 +193,57 @@ def test_limits_of_ros2_control_that_are_tighter_are_reported(tmp_path, interfac
         read_with_warning(path, r"limits of <ros2_control> that are tighter than <limit>: " + says)
 
 
+@pytest.mark.parametrize(
+    "ends, says",
+    [
+        ((-2.9, 2.9), r"j from -2\.9 to 2\.9 \(line 6\); make"),
+        ((-3, 2), r"j from -3 to 2 \(line 6\); make"),
+        ((-3, 3), None),
+        ((-4, 5), None),
+        ((0, 0), None),
+        ((1, -1), None),
+    ],
+)
+def test_soft_limits_that_are_tighter_are_reported(tmp_path, ends, says):
+    soft = f'<safety_controller k_velocity="1" soft_lower_limit="{ends[0]}" soft_upper_limit="{ends[1]}"/>'
+    path = write(tmp_path, dynamics=f"\n{soft}")
+    if says is None:
+        load_robot(path, strict=True)
+    else:
+        path.write_text(path.read_text().replace(f"\n{soft}", soft))
+        read_with_warning(path, r"soft limits of <safety_controller> that are tighter than <limit>: " + says)
+
+
+@pytest.mark.parametrize(
+    "lower, upper, told",
+    [
+        (-180, 180, True),
+        (0, 90, True),
+        (-165, 50, True),
+        (-3, 3, False),
+        (-100, 100, False),  # a common stand-in for no limit
+        (-31.4, 31.4, False),
+        (0, 40, False),
+        (-720, 720, False),
+    ],
+)
+def test_ranges_in_degrees_are_told_of(tmp_path, lower, upper, told):
+    path = write(tmp_path)
+    path.write_text(path.read_text().replace('lower="-3" upper="3"', f'lower="{lower}" upper="{upper}"'))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        robot = load_robot(path, strict=True)
+    assert (robot.limits["j"].lower, robot.limits["j"].upper) == (lower, upper)
+    found = [str(x.message) for x in caught if issubclass(x.category, jn.errors.UnitWarning)]
+    assert len(found) == told
+    assert not told or f"look like degrees, and are read as radians: j ({lower} to {upper}); write" in found[0]
+    slide = path.read_text().replace('type="revolute"', 'type="prismatic"')
+    path.write_text(slide)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load_robot(path)
+
+
 def test_a_rotor_of_a_joint_of_several_coordinates(tmp_path):
     rotor = ROTOR.format('<joint name="j"/>', '<drake:rotor_inertia value="1"/>')
     read_with_warning(write(tmp_path, rotor, kind="planar"), r"armature of planar, floating and spherical joints: j")

@@ -33,6 +33,7 @@ WEIGHT = "the weight of links that <gazebo> takes out of gravity, which other re
 FORCE_ELEMENTS = "<force_element>, which is a force"
 REDUCTIONS = "<mechanicalReduction> of transmissions with rotors, which count with <drake:gear_ratio>, or 1 without it"
 CONTROL_LIMITS = "limits of <ros2_control> that are tighter than <limit>"
+SOFT_LIMITS = "soft limits of <safety_controller> that are tighter than <limit>"
 QUATERNIONS = "quat_xyzw, which the version of this file does not have"
 LINK_PARTS = ("inertial", "mass", "inertia", "pose")
 JOINT_PARTS = ("axis", "axis2", "dynamics", "mimic", "pose", "gearbox_ratio")
@@ -152,6 +153,7 @@ def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]],
             _leave(faults, heading, element.attributes.get("name") or f"<{element.tag}>", element, LEAVE)
         elif element.tag == "joint":
             _note_dynamics(element, faults)
+            _note_soft_limits(element, robot, faults)
         elif element.tag == "gazebo":
             for heading, shown, part in _of_gazebo(element, elements, robot, names, moving=moving):
                 _leave(faults, heading, shown, part, LEAVE)
@@ -178,6 +180,25 @@ def _note_dynamics(joint: Element, faults: Faults) -> None:
         where = ("joints", name, "dynamics", key)
         if dynamics is not None and (value := dynamics.numbers(key, 1, *where, infinite=True)) not in (None, [0.0]):
             faults.leave_out(heading, name, dynamics.error(left_out(heading), *where, value=value))
+
+
+def _note_soft_limits(joint: Element, robot: Robot, faults: Faults) -> None:
+    """Record a range that a controller keeps within that of a joint; both ends are zero if there is none."""
+    soft, name = joint.first("safety_controller"), joint.attributes["name"]
+    if soft is None or name not in robot.joints:
+        return
+    where = ("joints", name, "safety_controller")
+    low, high = (
+        (soft.numbers(f"soft_{end}_limit", 1, *where, infinite=True) or [0.0])[0] for end in ("lower", "upper")
+    )
+    limits = robot.joints[name].limits
+    lower, upper = (
+        -math.inf if limits.lower is None else limits.lower,
+        math.inf if limits.upper is None else limits.upper,
+    )
+    if low < high and (low > lower or high < upper):
+        error = soft.error(LEAVE.format(SOFT_LIMITS), *where, value=[low, high])
+        faults.leave_out(SOFT_LIMITS, f"{name} from {low:g} to {high:g}", error)
 
 
 def _note_control(control: Element, joints: Mapping[str, Element], robot: Robot, faults: Faults) -> None:
