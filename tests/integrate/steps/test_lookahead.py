@@ -165,3 +165,29 @@ def test_a_pulse_of_a_driver():
     assert [jn.Status(s).name for s in torn.status] == ["OK", "OK", "COLLAPSED"]
     assert torn.ended_at == pytest.approx(0.3, abs=1e-9)
     assert torn.faults == {2: "drivers.s at t = 0.3 s"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "law", ["0.3*sign(t - 0.77)", "t + 1e-4*sign(t - 0.77)", jn.laws.PiecewiseMotion(["t", "0.78"], until=[0.77])]
+)
+def test_a_run_ends_where_a_law_jumps_that_has_a_value_there(law):
+    """A trolley that is set elsewhere leaves its load undetermined."""
+    rail = ([0, 0], [0, 0], [1, 0], [1, 0])
+    crane = jn.Mechanism(
+        space="planar",
+        gravity=[0, -9.81],
+        bodies={
+            "trolley": jn.Body([0, 0], mass=5.0, inertia=1.0),
+            "load": jn.Body([0, 0], angle=-1.2, mass=2.0, inertia=0.3, center_of_mass=[0.7, 0]),
+        },
+        joints={
+            "rail": planar.Prismatic(("ground", "trolley"), *rail),
+            "hook": planar.Revolute(("trolley", "load"), [0, 0], [0, 0]),
+        },
+        drivers={"x": drivers.CoordinateDriver(("ground", "trolley"), "x", law)},
+    )
+    run = jn.simulate(crane, [0.0, 0.5, 2.0], 1, strict=False)
+    assert [jn.Status(s).name for s in run.status] == ["OK", "OK", "COLLAPSED"]
+    assert run.ended_at == pytest.approx(0.77, abs=1e-9)
+    assert run.faults == {2: "drivers.x at t = 0.77 s"}

@@ -14,7 +14,7 @@ from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, I
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import mapped
 from jounce.integrate.steps import energy_balance, lookahead
-from jounce.integrate.steps.lookahead import HARMLESS, SHORTEST, steps_counted
+from jounce.integrate.steps.lookahead import HARMLESS, JUMP, SHORTEST, steps_counted
 from jounce.integrate.steps.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
 from jounce.integrate.steps.projection import projected
 from jounce.integrate.steps.revolution_counts import AnglesOfForces, followed, measured
@@ -281,6 +281,7 @@ def _attempt(
             suspect = (look.kink >= 0) & (size < tried) | (current.refused >= STUBBORN)
             kick = 0.5 * order * (order + 1) * error
             good = good & ~(suspect & _kick_matters(kick, step, duration, MARGIN * allowed, current))
+            good = good & (distance <= jnp.maximum(JUMP, MARGIN * allowed))  # farther away, a motion law has jumped
         balanced, balance = jnp.ones(step.shape, bool), current.balance
         if checked:
             energies_there = energy_balance.energies(there, there.pose(state), Jet.variable(time[None], 1))
