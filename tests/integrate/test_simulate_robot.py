@@ -167,6 +167,41 @@ def test_driven_joint_and_feedback(driving):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "law, value, until",
+    [
+        ("0.3*sign(t - 0.77)", lambda t: 0.3 * np.sign(t - 0.77), 0.77),
+        ("0.3*(t + abs(t - 0.77))", lambda t: 0.3 * (t + np.abs(t - 0.77)), 0.77),
+        (lambda t: jnp.abs(t - 0.6), lambda t: np.abs(t - 0.6), 0.6),
+        (jn.laws.PiecewiseMotion(["t", "0.7"], until=[0.7]), lambda t: np.minimum(t, 0.7), 0.7),
+        ("0.3*(t - 0.77)*abs(t - 0.77)", lambda t: 0.3 * (t - 0.77) * np.abs(t - 0.77), None),
+        ("0.5*(1 + tanh((t - 1)/1e-3))", lambda t: 0.5 * (1 + np.tanh((t - 1) / 1e-3)), None),
+        ("sin(30*t)", lambda t: np.sin(30 * t), None),
+    ],
+)
+def test_a_driven_joint_follows_its_law_or_the_run_ends(law, value, until):
+    """The equations have accelerations of the law only; where its value or velocity jumps, the run ends."""
+    found = jn.simulate(slider(), TIME, 1, driven={"slide": law}, strict=False)
+    reached = TIME <= 2.0 if until is None else until > TIME
+    assert ((found.status == int(Status.OK)) == reached).all()
+    assert np.abs(found.q[reached, 0, 0] - value(TIME[reached])).max() <= 1e-9
+    if until is not None:
+        assert found.ended_at == pytest.approx(until, abs=1e-8)
+        assert found.faults[int(np.argmin(reached))].startswith("driven.slide: the law or its velocity jumps at t = ")
+
+
+@pytest.mark.slow
+def test_a_terminal_event_before_a_driven_joint_leaves_its_law_ends_the_run():
+    law, event = "abs(t - 0.75)", jn.integrate.JointEvent("slide", value=0.25, terminal=True)
+    found = jn.simulate(slider(), TIME, 1, driven={"slide": law}, events=[event])
+    assert found.events == [[pytest.approx(0.5, abs=1e-12)]]
+    assert found.status[-1] == int(Status.NOT_REACHED)
+    assert not found.faults
+    with pytest.raises(jn.errors.SolveError, match=r"driven\.slide: the law or its velocity jumps at t = 0\.75 s"):
+        jn.simulate(slider(), TIME, 1, driven={"slide": law})
+
+
+@pytest.mark.slow
 def test_free_base_keeps_its_momenta_and_energy():
     robot = satellite()
     base = jn.robot.BaseMotion([0, 0, 0], [1, 0, 0, 0], [[0.1, 0.2, 0.3, 3.0, -1.0, 2.0]])

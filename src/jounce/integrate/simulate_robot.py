@@ -5,6 +5,7 @@ from typing import Any, TypedDict
 
 import jax
 import numpy as np
+from jaxtyping import Float, Int
 
 from jounce.base.activity import Count
 from jounce.base.shapes import ArrayLike, is_traced
@@ -13,7 +14,7 @@ from jounce.integrate.marching.exact_numbers import ExactNumbers
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
 from jounce.integrate.marching.marching import Outcome, RunLimits, steps_between_looks
 from jounce.integrate.marching.robot_marching import STUCK, Progress, RobotProblem, RobotSteps, march_robot
-from jounce.integrate.marching.robot_state import RobotState, start_levels
+from jounce.integrate.marching.robot_state import RobotState, at, start_levels
 from jounce.integrate.marching.runs import AbstractRun
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.steps.methods import AbstractMethod, Taylor
@@ -30,6 +31,9 @@ from jounce.robot.robot import Robot
 from jounce.trajectory.laws.user_laws import law_or_number
 
 MOST = 1_000_000  # attempted steps of a run
+SHARES = np.linspace(0.0, 1.0, 33)  # of a step, at which driven joints are compared with their laws
+ASTRAY = 1e-9  # rad or sizes of the robot, or 100 tolerances: farther from its law a driven joint has left it
+ROUNDS = 8  # of as many instants each, between two of these, to find when it left it
 
 
 class RobotOptions(TypedDict, total=False):
@@ -92,7 +96,7 @@ def simulate_robot(
         raise RobotError("robots are simulated by jn.Taylor", name="method", value=type(method).__name__)
     longest = longest_step if method.step is None else method.step
     limits = RunLimits(*map(np.float64, (instants[-1], tolerance, longest, instants[0])))
-    run = RobotRun(problem, start, method.expansion_order(tolerance) - 1, limits, detectors)
+    run = RobotRun(problem, robot.joint_names, start, method.expansion_order(tolerance) - 1, limits, detectors)
     with Count("simulating", report=progress) as tell:
         run.go(instants, tell)
     outcome = run.ending, run.happened, tuple(wrenches), run.backends
@@ -157,6 +161,7 @@ class RobotRun(AbstractRun):
     def __init__(
         self,
         problem: RobotProblem,
+        names: Sequence[str],
         start: RobotState,
         order: int,
         limits: RunLimits,
@@ -165,7 +170,8 @@ class RobotRun(AbstractRun):
         running, none, nothing = np.asarray(int(Outcome.RUNNING)), np.asarray(0), np.zeros(1)
         begun = Progress(np.array([limits.start]), start, running, none, none, nothing, nothing)
         super().__init__(begun, limits, detectors)
-        self.problem, self.tried = problem, 0
+        self.problem, self.names, self.tried = problem, names, 0
+        self.left = ""  # the driven joint that left its law, in words
         count = steps_between_looks((order + 2) * 2 * len(problem.scale), watched=bool(detectors))
         self._settings: Any = {"order": order, "count": count, "exact": ExactNumbers.of_parallel(problem.equations)}
 
@@ -183,6 +189,44 @@ class RobotRun(AbstractRun):
             current = current._replace(outcome=np.asarray(int(Outcome.COLLAPSED)))
         return current, steps, count
 
+    def _march(self) -> RobotSteps | None:
+        """Attempt some steps, and return them up to the first instant at which a driven joint leaves its law.
+
+        The equations have accelerations of laws only, so that a jump of a law or of its velocity leaves no other trace.
+        """
+        steps = super()._march()
+        if steps is None or not self.problem.prescribed.changing:
+            return steps
+        starts, lengths = steps.start, steps.length
+        astray = self._departures(steps, np.repeat(np.arange(len(starts)), len(SHARES)), np.tile(SHARES, len(starts)))
+        astray, most = astray.reshape(-1, len(starts), len(SHARES)), max(ASTRAY, 100.0 * float(self.limits.tolerance))
+        left = np.abs(astray - astray[..., :1]) > most
+        if not left.any():
+            return steps
+        step = int(np.argmax(left.any(axis=(0, 2))))
+        point = int(np.argmax(left[:, step].any(axis=0)))
+        joint, (low, high) = int(np.argmax(left[:, step, point])), SHARES[point - 1 : point + 1]
+        for _ in range(ROUNDS):
+            between = low + SHARES * (high - low)
+            gap = self._departures(steps, np.full(len(SHARES), step), between)[joint] - astray[joint, step, 0]
+            point = max(int(np.argmax(np.abs(gap) > most)), 1)
+            low, high = between[point - 1 : point + 1]
+        instant = starts[step] + low * lengths[step]
+        self.left = f"driven.{self.names[joint]}: the law or its velocity jumps at t = {instant:g} s: make it smooth"
+        self.current = self.current._replace(outcome=np.asarray(int(Outcome.COLLAPSED)))
+        cut = jax.tree.map(lambda part: part[: step + 1], steps)
+        return cut._replace(length=np.append(lengths[:step], low * lengths[step]))
+
+    def _departures(
+        self, steps: RobotSteps, which: Int[np.ndarray, " point"], shares: Float[np.ndarray, " point"]
+    ) -> Float[np.ndarray, "joint point"]:
+        """Return the laws of driven joints minus their coordinates at shares of steps, rad or sizes of the robot."""
+        since = shares * steps.length[which]
+        path = at(jax.tree.map(lambda part: np.moveaxis(part[which], 0, -1), steps.polynomial), since).coordinates
+        laws = self.problem.prescribed_series(path, (steps.start[which] + since)[None], 0)[0]
+        apart = np.asarray(self.problem.equations.driven)[:, None] * (np.asarray(laws) - np.asarray(path))
+        return apart / np.asarray(self.problem.scale)[:, None]
+
     def initial_step(self) -> RobotSteps:
         """See `AbstractRun`."""
         at_rest = jax.tree.map(lambda x: np.asarray(x)[None, None, :, 0], self.current.state)
@@ -191,6 +235,8 @@ class RobotRun(AbstractRun):
     def explained(self) -> tuple[Status, str]:
         """See `AbstractRun`."""
         time = float(self.current.time[0])
+        if self.left:
+            return Status.COLLAPSED, self.left
         if self.tried > MOST:
             return Status.COLLAPSED, f"after {self.tried} steps"
         if int(self.current.stuck) >= STUCK // 2:

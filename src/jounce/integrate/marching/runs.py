@@ -78,7 +78,7 @@ class AbstractRun(abc.ABC):
                 progress(int(np.sum(passed)), len(instants))
         if not self.parts:
             self.parts.append(self.initial_step())
-        if self.current.outcome.item() in FAILED:
+        if self.current.outcome.item() in FAILED and self.stopped_at is None:
             self.ending = self.explained()
 
     def _march(self) -> Any:
