@@ -57,7 +57,7 @@ class Simulation(Motion):
     events : list of list of float
         For each requested event, the times at which it happened, s.
     kinks : list of tuple of float and str
-        Times of jumps and kinks of forces and motion laws, s, with the name of the force or law.
+        Times of jumps and kinks of forces, s, with their names, and of some of motion laws.
     dense_output : DenseOutput
         The steps as polynomials.
     steps_backend : str
@@ -136,9 +136,10 @@ class Simulation(Motion):
 
     @property
     def kinks(self) -> list[tuple[float, str]]:
-        """Times of jumps and kinks of forces and motion laws, s, with names; derivatives do not exist at them.
+        """Times of jumps and kinks of forces, s, with names; derivatives of the motion do not exist at them.
 
-        The step over a jump or kink is so short that it costs no digits, and the next step may be long again.
+        The step over a jump or kink is so short that it costs no digits, and the next step may be long again. Kinks of
+        motion laws are listed if such a step notes them; `jounce.laws.continuity` finds all.
         """
         kink, length = self.dense_output.kink, np.abs(self.dense_output.length)
         names = watched_names(self._start.model)
