@@ -224,8 +224,8 @@ class RobotRun(AbstractRun):
         since = shares * steps.length[which]
         path = at(jax.tree.map(lambda part: np.moveaxis(part[which], 0, -1), steps.polynomial), since).coordinates
         laws = self.problem.prescribed_series(path, (steps.start[which] + since)[None], 0)[0]
-        apart = np.asarray(self.problem.equations.driven)[:, None] * (np.asarray(laws) - np.asarray(path))
-        return apart / np.asarray(self.problem.scale)[:, None]
+        deviation = np.asarray(self.problem.equations.driven)[:, None] * (np.asarray(laws) - np.asarray(path))
+        return deviation / np.asarray(self.problem.scale)[:, None]
 
     def initial_step(self) -> RobotSteps:
         """See `AbstractRun`."""
