@@ -362,3 +362,12 @@ def test_limits_and_times_are_checked():
     rigid = jn.Robot("block", [jn.Link("base", jn.Inertia(1.0))], [])
     with pytest.raises(jn.errors.RobotError, match="no moving joint"):
         check_limits(rigid, trajectory)
+
+
+def test_limits_for_retiming_are_refused_with_what_to_give():
+    robot = jn.load_robot("examples/robots/planar_arm.xml")
+    laws = jn.JointTrajectory({"shoulder": "0.3*sin(3*t)"}, 0.0, 1.0)
+    limits = jn.planning.MotionLimits({"shoulder": jn.Limits(velocity=1.0)})
+    with pytest.raises(jn.errors.RobotError, match=r"got 'MotionLimits'; of .* give their `joints`"):
+        jn.check_limits(robot, laws, limits)
+    assert not jn.check_limits(robot, laws, limits.joints).broken

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, seconds
+from jounce.base.shapes import ArrayLike, Refused, seconds
 from jounce.dynamics.limits.limit_jumps import Infinite, infinite_quantities, jumps_of
 from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
 from jounce.dynamics.limits.local_maxima import local_maxima
@@ -39,7 +39,7 @@ ROUNDS = 8  # divisions of the step
 def check_limits(
     robot: Robot,
     trajectory: JointTrajectory,
-    limits: Mapping[str, Limits] | None = None,
+    limits: Mapping[str, Limits] | Refused | None = None,
     *,
     times: ArrayLike | None = None,
     drives: bool = True,
@@ -330,7 +330,10 @@ def word_of(joint: Joint, quantity: int) -> tuple[str, str]:
     return word, (TURNING if joint.turning else SLIDING)[field]
 
 
-def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limits]:
+def _merged(robot: Robot, limits: Mapping[str, Limits] | Refused | None) -> dict[str, Limits]:
+    if limits is not None and not isinstance(limits, Mapping):
+        message = "must be a mapping of joints to Limits; of jn.planning.MotionLimits, give their `joints`"
+        raise RobotError(message, name="limits", value=type(limits).__name__)
     given = dict(limits or {})
     for name, entry in given.items():
         if name not in robot.joint_names:
