@@ -171,9 +171,9 @@ class OnXla:
             if stored[links[0]] is linked[0]:
                 index[order[::-1]] = np.arange(len(order))[::-1]
             source = sources[order]
-            here = np.where(source < 0, np.arange(len(order)) - self.width, index[source])
-            before = np.unique(source[here < 0])  # sources that are not among the targets
-            source = np.where(here < 0, total + np.searchsorted(before, source), here)
+            position = np.where(source < 0, np.arange(len(order)) - self.width, index[source])
+            before = np.unique(source[position < 0])  # sources that are not among the targets
+            source = np.where(position < 0, total + np.searchsorted(before, source), position)
             room = STARTS * _power(-(-len(before) // STARTS))
             starts = [padded(x[..., before], room) for x in linked]
             given = [padded(x[..., order], total) for x in own]

@@ -63,7 +63,7 @@ def simulate_robots(
     values = _checked(robot, parameters)
     start = start_levels(robot, state)
 
-    def begun(k: int) -> tuple[Robot, Any]:
+    def start_of_run(k: int) -> tuple[Robot, Any]:
         levels, changed = [list(level) for level in start], robot
         for name, given in values.items():
             value = given[k] if traced else float(given[k])
@@ -77,7 +77,7 @@ def simulate_robots(
     starts = []
     for k in range(len(next(iter(values.values())))):
         try:
-            starts.append(begun(k))
+            starts.append(start_of_run(k))
         except JounceError as error:
             error.name = f"runs.{k}" if error.name is None else f"runs.{k}.{error.name}"
             raise

@@ -168,8 +168,8 @@ class RobotRun(AbstractRun):
         detectors: list[JointEventDetector],
     ):
         running, none, nothing = np.asarray(int(Outcome.RUNNING)), np.asarray(0), np.zeros(1)
-        begun = Progress(np.array([limits.start]), start, running, none, none, nothing, nothing)
-        super().__init__(begun, limits, detectors)
+        initial = Progress(np.array([limits.start]), start, running, none, none, nothing, nothing)
+        super().__init__(initial, limits, detectors)
         self.problem, self.names, self.tried = problem, names, 0
         self.left = ""  # the driven joint that left its law, in words
         count = steps_between_looks((order + 2) * 2 * len(problem.scale), watched=bool(detectors))

@@ -64,9 +64,9 @@ class LoopVariables:
             New arrays of the active lanes; a number that is already in its place is not loaded.
         """
 
-        def number(which: int, k: int, there: Value | None) -> Value:
-            if there is not None and there.home == (self.regions[which], k):
-                return there
+        def number(which: int, k: int, value: Value | None) -> Value:
+            if value is not None and value.home == (self.regions[which], k):
+                return value
             known = self.invariants[which].get(k) or self._same_in(which, k, ways)
             return known or self.code.load(self.regions[which], k)
 
@@ -76,8 +76,8 @@ class LoopVariables:
                 result.append(contiguous(self.regions[which], shape))
                 continue
             array = None if new is None else new[which]
-            there = flat(array) if isinstance(array, np.ndarray) else [None] * math.prod(shape)
-            result.append(filled(shape, [number(which, k, value) for k, value in enumerate(there)]))
+            values = flat(array) if isinstance(array, np.ndarray) else [None] * math.prod(shape)
+            result.append(filled(shape, [number(which, k, value) for k, value in enumerate(values)]))
         return result
 
     @contextmanager
@@ -242,7 +242,7 @@ def changed_in_place(
     regions: list[Region | None] = []
     for variable in [first.outvars[k] for k in results]:
         array, region = None if isinstance(variable, Literal) else given.get(variable), None
-        if isinstance(array, np.ndarray) and code.large is None and (which.lanes or code.here is None):
+        if isinstance(array, np.ndarray) and code.large is None and (which.lanes or code.active is None):
             values = [(k, value) for k, value in enumerate(flat(array)) if value.constant is None]
             homes = {value.home and value.home[0] for _, value in values}
             its = homes.pop() if len(homes) == 1 else None

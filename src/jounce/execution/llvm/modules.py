@@ -128,8 +128,8 @@ def _text(
         borrowed, returned = (
             [
                 f"%block = call noalias ptr @malloc(i64 {code.heap + 64})",
-                "%begun = ptrtoint ptr %block to i64",
-                "%before = sub i64 0, %begun",
+                "%address = ptrtoint ptr %block to i64",
+                "%before = sub i64 0, %address",
                 "%gap = and i64 %before, 63",
                 "%heap = getelementptr i8, ptr %block, i64 %gap",
             ],

@@ -127,17 +127,17 @@ def _written(
         given, result = [name(variable) for variable in equation.invars], list(equation.outvars)
         if not sparse and equation.source_info.name_stack is not stack:  # one for many operations
             stack, marked = equation.source_info.name_stack, is_by_certain_entries(equation)
-        here = sparse or marked
+        is_sparse = sparse or marked
         if equation.primitive.name in CALLS and not is_subroutine(equation):
             called, values = _called(equation)
             inner = dict(zip(called.invars, given, strict=True))
             for variable, value in zip(called.constvars, values, strict=True):
                 inner[variable] = Variable(variable.aval)
                 constants[inner[variable]] = value
-            written = _written(called, inner, operations, constants, known, alike, whole=False, sparse=here)
+            written = _written(called, inner, operations, constants, known, alike, whole=False, sparse=is_sparse)
             names |= zip(result, written, strict=True)
             continue
-        key = None if known is None else _key(equation, given, alike, here)
+        key = None if known is None else _key(equation, given, alike, is_sparse)
         before = None if known is None or key is None else known.get(key)
         if before is not None and equation.primitive.name not in VIEWS:
             names |= zip(result, before, strict=True)
@@ -148,7 +148,7 @@ def _written(
         if known is not None and key is not None:
             alike |= zip(result, before or result, strict=True)
             known.setdefault(key, result)
-        operations.append(Operation(equation.primitive, equation.params, given, result, here))
+        operations.append(Operation(equation.primitive, equation.params, given, result, is_sparse))
     return [name(variable) for variable in program.outvars]
 
 

@@ -175,8 +175,8 @@ class Program:
             def run(part: int) -> None:
                 start, stop = ends[part : part + 2]
                 if start < stop:
-                    here = [address + start * step for address, step in zip(addresses, steps, strict=True)]
-                    self._run((ctypes.c_void_p * len(here))(*here), stop - start)
+                    pointers = [address + start * step for address, step in zip(addresses, steps, strict=True)]
+                    self._run((ctypes.c_void_p * len(pointers))(*pointers), stop - start)
 
             list(each(run, range(parts)))
         return jax.tree.unflatten(self._structure, [x[first] for x in result])

@@ -76,17 +76,17 @@ def rounds_text(width: int) -> str:
         "define void @rounds(ptr %addresses, ptr %pairs, i64 %linked, i64 %own, i64 %kept, "
         "ptr %sources, ptr %targets, i64 %rounds) #1 {",
         "start:",
-        "%begun = icmp sgt i64 %rounds, 0",
-        "br i1 %begun, label %round, label %end",
+        "%has_rounds = icmp sgt i64 %rounds, 0",
+        "br i1 %has_rounds, label %round, label %end",
         "round:",
         "%turn = phi i64 [0, %start], [%following, %written]",
         f"%first = mul i64 %turn, {width}",
-        "%here = getelementptr i64, ptr %targets, i64 %first",
+        "%round_targets = getelementptr i64, ptr %targets, i64 %first",
     ]
     for lane in range(width):
         least = f"%least{lane - 1}" if lane else "0"
         lines += [
-            f"%place{lane} = getelementptr i64, ptr %here, i64 {lane}",
+            f"%place{lane} = getelementptr i64, ptr %round_targets, i64 {lane}",
             f"%target{lane} = load i64, ptr %place{lane}",
             f"%from{lane} = getelementptr i64, ptr %sources, i64 %target{lane}",
             f"%source{lane} = load i64, ptr %from{lane}",

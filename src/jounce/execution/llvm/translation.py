@@ -27,7 +27,7 @@ from jounce.execution.llvm.rules.operations import RULES
 from jounce.execution.llvm.subroutines import call_subroutine
 from jounce.execution.llvm.text.arrays import constants, filled
 from jounce.execution.llvm.text.code import Code
-from jounce.execution.llvm.text.lent_memory import among, give_back, give_back_but, let_go, regions_of
+from jounce.execution.llvm.text.lent_memory import among, forget_variables, regions_of, release_all_but, release_arrays
 from jounce.execution.llvm.text.stored import (
     any_lanes,
     is_large,
@@ -98,8 +98,8 @@ def translate(
             for variable, values in zip(operation.outvars, result, strict=True):
                 noted(variable, _checked(values, variable.aval))
             if code.large is not None:
-                give_back_but(code, code.taken[before:], result)
-                let_go(code, known, plan.ends.get(now, ()))
+                release_all_but(code, code.taken[before:], result)
+                forget_variables(code, known, plan.ends.get(now, ()))
         code.sparse = around
         results = [read(variable) for variable in plan.results]
         return results if late else [stored(code, x) if isinstance(x, Deferred) else x for x in results]
@@ -205,7 +205,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
         with code.scope(), state.held():
             before = state.load()
             with code.used(among([*condition, *needed, *before])):
-                goes = code.among_here(_number(code, _closed(code, p["cond_jaxpr"], condition, before)[0]))
+                goes = code.among_active(_number(code, _closed(code, p["cond_jaxpr"], condition, before)[0]))
             if goes.lanes and not all(lanes):  # a lane that has left keeps its own values
                 return ([True] * len(lanes), invariants), []
             code.branch(code.anywhere(goes), body, end)
@@ -216,7 +216,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
                 if goes.lanes:
                     after = chosen(code, goes, after, state.load(new=after))
                 state.store(after)
-                give_back(code, after)
+                release_arrays(code, after)
             code.jump(head)
         code.begin(end)
         return (_in_lanes(after, lanes), [*map(still_invariant, invariants, after)]), state.load()
@@ -291,7 +291,7 @@ def _rolled(
                     put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
             written.note_rows(results[size:], p["length"])
             state.store(results[:size])  # last, since other results may be parts of the carried arrays
-            give_back(code, results)
+            release_arrays(code, results)
             code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
             code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
         code.begin(end)
@@ -351,19 +351,19 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
         for k, way in enumerate(ways):
             homes.restore()
             word = "le" if k == 0 else "ge" if k == len(ways) - 1 else "eq"
-            here = code.among_here(code.compare(word, which, code.constant(k, which.kind)))
+            taken = code.among_active(code.compare(word, which, code.constant(k, which.kind)))
             begin, end = code.label(), code.label()
-            code.branch(code.anywhere(here), begin, end)
+            code.branch(code.anywhere(taken), begin, end)
             code.begin(begin)
             with (
-                code.scope(here if here.lanes else None),
-                code.used(among(inputs if k < len(ways) - 1 or here.lanes else [])),
+                code.scope(taken if taken.lanes else None),
+                code.used(among(inputs if k < len(ways) - 1 or taken.lanes else [])),
             ):
                 every = _closed(code, way, inputs)
                 made = [every[k] for k in changing]
                 differing = _in_lanes(made, differing)
                 if which.lanes and k > 0:
-                    made = chosen(code, here, made, results.load(k, made))
+                    made = chosen(code, taken, made, results.load(k, made))
                 results.store(made)
             code.jump(end)
             code.begin(end)

@@ -69,8 +69,8 @@ def refined_kink_state(state: State, series: State, length: Any, kinked: Kinked,
     gap = jnp.sum(over.velocity[..., None] * (before.velocity - after.velocity), axis=(0, 1))
     gap += jnp.sum(over.spin[..., None] * (before.spin - after.spin), axis=(0, 1))
     late = with_value(kinked.late - gap, 0.0)
-    here, there = evaluated(kinked.series, late), evaluated(series, length + late)
-    return jax.tree.map(lambda x, a, b: x + a - b, state, here, there), late
+    before, after = evaluated(kinked.series, late), evaluated(series, length + late)
+    return jax.tree.map(lambda x, a, b: x + a - b, state, before, after), late
 
 
 def with_value(x: Any, value: Any) -> Any:

@@ -235,8 +235,8 @@ def _attempt(
     stop, tolerance, longest, started = limits
     length, duration = equations.system.column_scale[0], jnp.abs(stop - started)
     order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
-    here = current.expansion.state.map(lambda part: part[0])
-    checked = method.controlled and energy_balance.is_balanced(equations, here, current.time[None])
+    first_state = current.expansion.state.map(lambda part: part[0])
+    checked = method.controlled and energy_balance.is_balanced(equations, first_state, current.time[None])
 
     def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
         running, opening = (current.outcome == int(x) for x in (Outcome.RUNNING, Outcome.UNEXPANDED))
@@ -265,11 +265,11 @@ def _attempt(
         time, rest = (jnp.where(running, x, y) for x, y in ((time, current.time), (rest, current.rest)))
 
         # end of the step
-        there = equations.near(angles.at(step))
-        arrived = method.arrive(there, start, current.time, step)
-        state, distance, inverse = projected(there, arrived, time[None])
+        counted = equations.near(angles.at(step))
+        arrived = method.arrive(counted, start, current.time, step)
+        state, distance, inverse = projected(counted, arrived, time[None])
         state = jax.tree.map(lambda a, b: jnp.where(opening, a, b), arrived, state)  # already on the constraints
-        expansion = expand(there, state, time[None], order, inverse)
+        expansion = expand(counted, state, time[None], order, inverse)
         acceleration, multipliers = expansion.acceleration[:1], expansion.multipliers[:1]  # no step needs their rates
         expansion = expansion._replace(acceleration=acceleration, multipliers=multipliers)
         error = method.error(start, expansion, step, length)
@@ -284,12 +284,12 @@ def _attempt(
             good = good & (distance <= jnp.maximum(JUMP, MARGIN * allowed))  # farther away, a motion law has jumped
         balanced, balance = jnp.ones(step.shape, bool), current.balance
         if checked:
-            energies_there = energy_balance.energies(there, there.pose(state), Jet.variable(time[None], 1))
+            energies = energy_balance.energies(counted, counted.pose(state), Jet.variable(time[None], 1))
             kick = MARGIN * allowed * order / jnp.maximum(wished, 1e-300)
             leeway = kick * length * jnp.sqrt(equations.scale * bodies)
-            balance, balanced = energy_balance.followed(current.balance, energies_there, leeway)
-            begun = energy_balance.begun(energies_there)
-            balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun, balance)
+            balance, balanced = energy_balance.followed(current.balance, energies, leeway)
+            at_start = energy_balance.initial_balance(energies)
+            balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), at_start, balance)
             good = good & balanced
 
         # outcome of the run
@@ -303,7 +303,7 @@ def _attempt(
         farthest = jnp.where(reach > longest, jnp.minimum(jnp.minimum(reach, longest / SHORT), duration), jnp.abs(step))
         short = steps_counted(current.short, step, duration)
         limiting = jnp.where(look.limiting >= 0, look.limiting, current.blocked)
-        onwards = IntegratorState(
+        advanced = IntegratorState(
             time=time,
             rest=rest,
             expansion=expansion,
@@ -312,7 +312,7 @@ def _attempt(
             mobility=lookahead.mobility_of(equations, inverse),
             singular=near_singular(equations, inverse),
             blocked=jnp.where(short > 0, limiting, -1),
-            angles=measured(there, state),
+            angles=measured(counted, state),
             longest=jnp.maximum(current.longest, farthest),
             crossing=steps_counted(current.crossing, step, duration, look.kink >= 0),
             short=short,
@@ -325,7 +325,7 @@ def _attempt(
             balance=current.balance._replace(broken=broken),
         )
         steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good
-        return jax.tree.map(lambda a, b: jnp.where(good | opening, a, b), onwards, refused), steps
+        return jax.tree.map(lambda a, b: jnp.where(good | opening, a, b), advanced, refused), steps
 
     return attempt
 

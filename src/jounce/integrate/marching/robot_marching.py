@@ -346,8 +346,8 @@ def march_robot(
         last = step >= jnp.abs(left)
         arrived = at(polynomial, direction * step[None])
         since = direction * step + current.rest[0]
-        onwards = jnp.where(last, stop, time[0] + since)
-        rest = jnp.where(last, 0.0, since - (onwards - time[0]))
+        time_after = jnp.where(last, stop, time[0] + since)
+        rest = jnp.where(last, 0.0, since - (time_after - time[0]))
         short = (step < SHORT * wished) & ~last
         stuck = steps_counted(current.stuck, step, duration, longest=STUCK_STEP)
         moves = known & (low > 0) & (stuck < STUCK)
@@ -358,7 +358,7 @@ def march_robot(
         outcome = jnp.where(moves, outcome, failed)
         crossing = steps_counted(current.crossing, step, duration, over | (low == 0.0))
         longest_so_far = jnp.maximum(current.longest, step)
-        after = Progress(onwards[None], arrived, outcome, stuck, crossing, rest[None], longest_so_far)
+        after = Progress(time_after[None], arrived, outcome, stuck, crossing, rest[None], longest_so_far)
         steps = RobotSteps(time, direction * step[None], polynomial, (short | over)[None])
         stay = current._replace(outcome=outcome, crossing=crossing)
         return jax.tree.map(lambda a, b: jnp.where(moves, a, b), after, stay), (steps, moves[None])

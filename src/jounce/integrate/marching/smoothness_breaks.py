@@ -105,8 +105,8 @@ def _between(
 
     def stays(level: int) -> bool:
         """Return whether the difference is constant along the step, as at a jump but not at the foot of a pulse."""
-        there = gap(over, level)
-        return bool(np.abs(gap(0.0, level) - there).max() <= ALIKE * np.abs(there).max())
+        last_gap = gap(over, level)
+        return bool(np.abs(gap(0.0, level) - last_gap).max() <= ALIKE * np.abs(last_gap).max())
 
     def differ(level: int, least: float) -> bool:
         return bool(np.abs(gap(over, level)).max() > least + BEYOND * _left_out(before, over, level))

@@ -128,14 +128,14 @@ def simulate_batch(
     check_laws(mechanism, instants, order, forces=True)
     nominal = consistent_start(first, float(instants[0]))
     parametric = ParametricMechanism(first, nominal.model, names)
-    begun = parametric
+    with_conditions = parametric
     if first.initial:
         model, _ = with_reference(build(initial_as_drivers(first)), nominal.model.reference, float(instants[0]))
-        begun = ParametricMechanism(initial_as_drivers(first), model, names)
+        with_conditions = ParametricMechanism(initial_as_drivers(first), model, names)
     limits = RunLimits(instants[-1], float(tolerance), float(longest_step), instants[0])
     runs = _Runs(parametric, rows, instants, order, limits, method)
 
-    starts = BatchStart(parametric, begun, nominal.state, rows, float(instants[0]))
+    starts = BatchStart(parametric, with_conditions, nominal.state, rows, float(instants[0]))
 
     def start_runs(some: np.ndarray) -> None:
         runs.start_runs(some, *starts.of(some))
@@ -220,14 +220,14 @@ class _Runs:
         """Start runs from states on the constraints, with given revolutions of angles about axes."""
         equations, time = self._made.at(runs)[0].near(of_forces), np.full(len(runs), self.instants[0])
         current = unexpanded(equations, state, time, order=self.method.expansion_order(float(self.limits.tolerance)))
-        current, begun = jax.tree.map(np.asarray, current), dict(zip(self._measuring, of_outputs, strict=True))
+        current, first_angles = jax.tree.map(np.asarray, current), dict(zip(self._measuring, of_outputs, strict=True))
         if self._current is None:
             self._current = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), current)
-            self._turns = {which: np.zeros((len(angle), len(self.steps))) for which, angle in begun.items()}
+            self._turns = {which: np.zeros((len(angle), len(self.steps))) for which, angle in first_angles.items()}
         self._put(runs, current)
-        for which, angle in begun.items():
+        for which, angle in first_angles.items():
             self._turns[which][:, runs] = angle
-        self._note(runs, np.zeros(len(runs), int), current.expansion.state, time, current.angles, begun)
+        self._note(runs, np.zeros(len(runs), int), current.expansion.state, time, current.angles, first_angles)
 
     def advance(self, runs: np.ndarray) -> None:
         """Advance runs by some steps, and store their outputs at the instants that they pass."""

@@ -120,7 +120,7 @@ class BatchStart:
     ----------
     parametric : ParametricMechanism
         The mechanism of the runs.
-    begun : ParametricMechanism
+    with_conditions : ParametricMechanism
         The same with the initial conditions as drivers.
     state : State
         Initial state of the first run.
@@ -133,7 +133,7 @@ class BatchStart:
     def __init__(
         self,
         parametric: ParametricMechanism,
-        begun: ParametricMechanism,
+        with_conditions: ParametricMechanism,
         state: State,
         rows: np.ndarray,
         instant: float,
@@ -141,14 +141,14 @@ class BatchStart:
         self._parametric, self._state, self._rows, self._instant = parametric, state, rows, instant
         self.failed: dict[int, Status] = {}  # runs without an initial state, with the reason
         self._made, self._stages = parametric.of(rows), list[VariedTree]()
-        equations, coordinates = begun.model.system.shape
-        rank = begun.model.system.rank
+        equations, coordinates = with_conditions.model.system.shape
+        rank = with_conditions.model.system.rank
         if (equations if rank is None else rank) < coordinates and parametric.guesses_differ(rows):
             return
-        last = begun.of(rows)
+        last = with_conditions.of(rows)
         count = max(STAGES, int(np.ceil(self._turned(last.at(slice(None))[0], len(rows)) / LARGEST_STAGE)))
         change = (rows - rows[0]) / count
-        self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, count)] + [last]
+        self._stages = [with_conditions.of(rows[0] + stage * change) for stage in range(1, count)] + [last]
 
     def _turned(self, equations: Equations, count: int) -> float:
         """Return the largest difference of drivers of angles about axes between the first run and any other, rad."""

@@ -74,7 +74,7 @@ def prepare_run(
         return model.released if any(name.startswith("initial.") for name in model.rows) else model
 
     @cache
-    def begun() -> tuple[Equations, IntegratorState] | None:
+    def initial_state() -> tuple[Equations, IntegratorState] | None:
         if free().system.rank_is_open:
             return None
         masses, gravity = required_masses(mechanism, "the equations of motion"), gravity_of(mechanism)
@@ -86,11 +86,11 @@ def prepare_run(
         return jax.ShapeDtypeStruct((*part.shape[1:axes], 1), float)
 
     def steps() -> None:
-        if (beginning := begun()) is not None:
+        if (beginning := initial_state()) is not None:
             march.prepare(*beginning, limits, **march_settings(*beginning, method, watched=watched))
 
     def motion() -> None:
-        if (beginning := begun()) is not None:
+        if (beginning := initial_state()) is not None:
             equations, current = beginning
             like = jax.eval_shape(partial(room_for_steps, method, count=1), current)[0]
             polynomial, now = like.polynomial.map(lambda part: one(part, 4)), jax.ShapeDtypeStruct((1,), float)

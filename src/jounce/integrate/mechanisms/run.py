@@ -68,17 +68,17 @@ class MechanismRun(AbstractRun):
         """Return the reason why the steps ended, and the force, joint or body to look at."""
         current = self.current
         series, time = current.expansion.state, current.time.item()
-        here = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
-        onwards = self.direction * AHEAD * max(abs(time), abs(time - self.limits.start))
-        ahead = evaluated(series.map(lambda part: part[:2]), np.array([onwards]))
-        for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
+        start = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
+        ahead_by = self.direction * AHEAD * max(abs(time), abs(time - self.limits.start))
+        ahead = evaluated(series.map(lambda part: part[:2]), np.array([ahead_by]))
+        for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + ahead_by)):
             finite = all(np.isfinite(part).all() for part in state)
-            if finite and (names := _unfit(here, state, instant)):
+            if finite and (names := _unfit(start, state, instant)):
                 return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
-        if names := _unfit_rates(here, pose_coordinates(series), time):
+        if names := _unfit_rates(start, pose_coordinates(series), time):
             return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
         if current.outcome.item() == Outcome.UNBALANCED:
-            names = hiding_names(self.start.model, here.equations, series.map(lambda x: x[0]), np.array([[time]]))
+            names = hiding_names(self.start.model, start.equations, series.map(lambda x: x[0]), np.array([[time]]))
             return Status.UNBALANCED, f"{', '.join(names) or 'all joints'} at t = {time:g} s"
         kink = int(self.parts[-1].kink[-1]) if self.parts else -1
         if current.short.item() >= STUCK and kink >= 0:

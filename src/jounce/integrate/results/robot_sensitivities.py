@@ -216,11 +216,11 @@ def _marched(
         return polynomial_of(problem.series(state, time[None], ORDER, reversible=True))
 
     def step(state: RobotState, given: Any) -> tuple[RobotState, RobotState]:
-        time, onwards = given
-        return at(series(state, time[None]), onwards[None]), state
+        time, duration = given
+        return at(series(state, time[None]), duration[None]), state
 
-    _, begun = jax.lax.scan(step, first, (start, length))
-    own = jax.tree.map(lambda x: jnp.moveaxis(x[which, :, 0], 0, -1), begun)
-    there = at(series(own, start[which]), since)
-    expanded = problem.series(there, instants[None], levels, reversible=True)
+    _, states = jax.lax.scan(step, first, (start, length))
+    own = jax.tree.map(lambda x: jnp.moveaxis(x[which, :, 0], 0, -1), states)
+    reached = at(series(own, start[which]), since)
+    expanded = problem.series(reached, instants[None], levels, reversible=True)
     return coordinates_of(expanded, levels)

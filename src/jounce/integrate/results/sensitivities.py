@@ -192,9 +192,9 @@ def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -
     """Return the initial state, with derivatives by which joints, drivers and initial conditions remain satisfied."""
     known = simulation.dense_output.polynomial.map(lambda part: jnp.asarray(part)[0, 0, ..., None])
     instant = np.array([[simulation.dense_output.start[0]]])
-    begun = traced_model(initial_as_drivers(mechanism), simulation.model.length)
+    start_model = traced_model(initial_as_drivers(mechanism), simulation.model.length)
     scales = {"column_scale": equations.system.column_scale}
-    whole = dataclasses.replace(equations, system=with_fields(begun.system, outputs=(), forces=(), **scales))
+    whole = dataclasses.replace(equations, system=with_fields(start_model.system, outputs=(), forces=(), **scales))
     rows, columns = whole.system.shape
     if rows == columns:
         return _corrected(whole, _corrected(whole, known, instant), instant)  # twice, for second derivatives
@@ -274,7 +274,7 @@ def _marched(
 
     States at the beginnings of the pieces have the recorded values.
     """
-    begun, lengths, known, used, kinks = pieces
+    starts, lengths, known, used, kinks = pieces
     max_order = used.shape[1] - 1
 
     def series(state: State, used: Any, time: Any) -> State:
@@ -285,8 +285,8 @@ def _marched(
     @jax.checkpoint
     def march(carry: Any, step: Any) -> tuple[Any, State]:
         state, kinked = carry
-        time, length, here, used, over = step
-        time, length, state = time[None], length[None], jax.tree.map(with_value, state, here)
+        time, length, recorded_state, used, over = step
+        time, length, state = time[None], length[None], jax.tree.map(with_value, state, recorded_state)
         expanded = series(state, used[:, None], time)
         arrived, end = evaluated(expanded, length), time + length
         if over is not None:
@@ -297,7 +297,7 @@ def _marched(
         return (_corrected(equations, arrived, end[None]), kinked), state
 
     none = None if kinks is None else Kinked(shifted(start.map(lambda part: part[None])), jnp.zeros(1))
-    path = begun, lengths, known.map(lambda part: part[..., None]), used, kinks
+    path = starts, lengths, known.map(lambda part: part[..., None]), used, kinks
     _, states = jax.lax.scan(march, (start, none), path)
     chosen_states = states.map(lambda part: jnp.moveaxis(part[chosen, ..., 0], 0, -1))
     time = instants - since

@@ -320,12 +320,12 @@ def expanded(
     """
     (equations, outputs), (angles, polynomial, step, instants) = shared, lanes
     equations = equations.near(angles)
-    begun = revolution_counts.measured(equations, polynomial.map(lambda part: part[0]))
-    there = equations.near(revolution_counts.followed(equations, begun, polynomial, step).at(step))
-    state, _, inverse = projected(there, evaluated(polynomial, step), instants[None])
-    series = expand(there, state, instants[None], order, inverse).state
+    first_angles = revolution_counts.measured(equations, polynomial.map(lambda part: part[0]))
+    counted = equations.near(revolution_counts.followed(equations, first_angles, polynomial, step).at(step))
+    state, _, inverse = projected(counted, evaluated(polynomial, step), instants[None])
+    series = expand(counted, state, instants[None], order, inverse).state
     outputs_found = output_series(outputs, pose_coordinates(series), equations.pose_type)
-    return series, revolution_counts.measured(there, state), outputs_found
+    return series, revolution_counts.measured(counted, state), outputs_found
 
 
 @mapped(widths=(FEW_INSTANTS, *WIDTHS))

@@ -115,7 +115,7 @@ def energies(equations: Equations, pose: Pose, clock: Jet) -> Energies:
     return Energies(kinetic, potential, size, exchanging > 0)
 
 
-def begun(energies: Energies) -> Balance:
+def initial_balance(energies: Energies) -> Balance:
     """Return the energy balance at the start of runs."""
     nothing = jnp.zeros_like(energies.kinetic)
     return Balance(energies, energies.kinetic, nothing, energies.exchanging, nothing > 0)

@@ -154,18 +154,18 @@ def look_ahead(
         return jnp.where(low > 0, high - low > NEAR * low, high * jnp.abs(step) > 0.25 * shortest)
 
     def narrowed(carry: Any) -> tuple[Any, ...]:
-        low, high, best, begun = carry
+        low, high, best, is_started = carry
         inside = jnp.where(open_(low, high), jnp.where(low > 0, 0.5 * (low + high), 0.5 * high), low)
-        look = seen(jnp.where(begun, inside, 1.0))
+        look = seen(jnp.where(is_started, inside, 1.0))
         better = look.resolved & (look.step > low)
-        best = jax.tree.map(lambda new, old: jnp.where(better | ~begun, new, old), look, best)
+        best = jax.tree.map(lambda new, old: jnp.where(better | ~is_started, new, old), look, best)
         limiting = jnp.where(look.resolved, best.limiting, look.limiting)
         high = jnp.where(look.resolved, high, look.step)
         return jnp.where(better, look.step, low), high, best._replace(limiting=limiting), jnp.ones((), bool)
 
     def unfinished(carry: Any) -> Any:
-        low, high, _, begun = carry
-        return ~begun | jnp.any(open_(low, high))
+        low, high, _, is_started = carry
+        return ~is_started | jnp.any(open_(low, high))
 
     # the whole step is the first iteration of the loop, so that the large code of `seen` is compiled once
     none, whole = jnp.zeros(step.shape), jnp.ones(step.shape)

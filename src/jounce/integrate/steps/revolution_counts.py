@@ -81,12 +81,12 @@ def followed(equations: Equations, angles: AnglesOfForces, path: State, step: La
     if not angles:
         return Angles((), step)
 
-    def onwards(near: Any, share: Any) -> tuple[Any, Any]:
-        angles_there = measured(equations.near(near), evaluated(path, share * step))
-        return angles_there, angles_there
+    def follow_angles(near: Any, share: Any) -> tuple[Any, Any]:
+        following = measured(equations.near(near), evaluated(path, share * step))
+        return following, following
 
-    _, angles_there = jax.lax.scan(onwards, angles, jnp.arange(1.0, POINTS_IN_STEP + 1) / POINTS_IN_STEP)
-    return Angles(tuple(jnp.concatenate([a[None], b]) for a, b in zip(angles, angles_there, strict=True)), step)
+    _, following = jax.lax.scan(follow_angles, angles, jnp.arange(1.0, POINTS_IN_STEP + 1) / POINTS_IN_STEP)
+    return Angles(tuple(jnp.concatenate([a[None], b]) for a, b in zip(angles, following, strict=True)), step)
 
 
 def attitudes_at(

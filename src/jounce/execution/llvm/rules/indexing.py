@@ -169,13 +169,13 @@ def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequenc
     ]
     result = array.copy()
     for first in itertools.product(*firsts):
-        here = code.constant(True)
+        is_target = code.constant(True)
         for axis in moving:
             number = code.constant(first[axis], indices[axis].kind)
-            here = code.logic("and", here, code.compare("eq", indices[axis], number))
+            is_target = code.logic("and", is_target, code.compare("eq", indices[axis], number))
         for offset in np.ndindex(new.shape):
             position = tuple(a + b for a, b in zip(first, offset, strict=True))
-            result[position] = code.select(here, new.item(offset), result.item(position))
+            result[position] = code.select(is_target, new.item(offset), result.item(position))
     return [result]
 
 
@@ -239,10 +239,10 @@ def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
         return [array]
     windows, add, result = windows_of(equation), equation.primitive.name == "scatter-add", flat(array)
 
-    def put(index: int, value: Value, here: Value) -> None:
+    def put(index: int, value: Value, is_target: Value) -> None:
         if index >= 0:
             new = code.arithmetic("add", result[index], value) if add else value
-            result[index] = code.select(here, new, result[index])
+            result[index] = code.select(is_target, new, result[index])
 
     if moving is None:
         for index, value in zip(windows.positions(known, array.shape).ravel().tolist(), flat(updates), strict=True):
@@ -255,6 +255,6 @@ def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
         index = indices[(*(position[k] for k in windows.batch), moving)]
         index = index if windows.drop else within(code, index, starts[0], starts[-1])
         for start, table in zip(starts, tables, strict=True):
-            here = code.compare("eq", index, code.constant(start, index.kind))
-            put(int(table[position]), updates.item(position), here)
+            is_target = code.compare("eq", index, code.constant(start, index.kind))
+            put(int(table[position]), updates.item(position), is_target)
     return [filled(array.shape, result)]

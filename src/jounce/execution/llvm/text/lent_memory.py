@@ -13,20 +13,20 @@ def among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
     return regions_of(arrays).__contains__
 
 
-def let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
+def forget_variables(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
     """Forget variables that are not read any more, and release memory that only they used."""
     gone = [known.pop(variable, None) for variable in variables]
-    give_back(code, [array for array in gone if isinstance(array, InMemory)])
+    release_arrays(code, [array for array in gone if isinstance(array, InMemory)])
 
 
-def give_back(code: Code, arrays: Sequence[Array]) -> None:
+def release_arrays(code: Code, arrays: Sequence[Array]) -> None:
     """Release the memory of arrays unless it is still used."""
     for region in regions_of(arrays) if arrays else ():
         if code.is_unshared(region):
             code.release(region)
 
 
-def give_back_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) -> None:
+def release_all_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) -> None:
     """Release allocated memory except that of arrays."""
     live = regions_of(arrays) if taken else {}
     for region in dict.fromkeys(taken):

@@ -73,7 +73,7 @@ class Scalars:
         Names and numbers of arguments of called C library functions.
     intrinsics : set of str
         Declarations of called LLVM intrinsics.
-    here : Value or None
+    active : Value or None
         Mask of the active lanes; None for all.
     sparse : bool
         Whether a constant zero is a structural zero, with which no product is emitted.
@@ -84,7 +84,7 @@ class Scalars:
     lines: list[str] = field(default_factory=list)
     functions: set[tuple[str, int]] = field(default_factory=set)
     intrinsics: set[str] = field(default_factory=set)
-    here: Value | None = None
+    active: Value | None = None
     sparse: bool = False
     _count: int = 0
     _known: dict[str, Value] = field(default_factory=dict)  # results of emitted instructions
@@ -150,26 +150,26 @@ class Scalars:
         return self._emitted(f"call {written} @llvm.{name}{sizes}({listed})", result, lanes=lanes)
 
     @contextmanager
-    def scope(self, here: Value | None = None) -> Iterator[None]:
+    def scope(self, active: Value | None = None) -> Iterator[None]:
         """Begin a scope, whose results are forgotten at its end, since not every path passes it.
 
         Parameters
         ----------
-        here : Value or None
+        active : Value or None
             Mask of the active lanes in the scope, if it differs from that around it.
         """
-        around = self.here
-        self.here = around if here is None else here
+        around = self.active
+        self.active = around if active is None else active
         self._scopes.append([])
         try:
             yield
         finally:
             self._forget(self._scopes.pop())
-            self.here = around
+            self.active = around
 
-    def among_here(self, choice: Value) -> Value:
+    def among_active(self, choice: Value) -> Value:
         """Return a truth value restricted to the active lanes, if it differs from lane to lane."""
-        return choice if self.here is None or not choice.lanes else self.logic("and", choice, self.here)
+        return choice if self.active is None or not choice.lanes else self.logic("and", choice, self.active)
 
     def constant(self, number: Any, kind: str | None = None) -> Value:
         """Return a constant, by default of the kind of its type."""
