@@ -61,6 +61,14 @@ def test_the_second_file_too(run):
     assert "is a trajectory" in run("check", PANDA, GOOD, "--limits", WAVE)[2]
 
 
+@pytest.mark.parametrize("given, kind", [(PANDA, "robot"), (FOUR_BAR, "mechanism")])
+def test_a_file_in_the_place_of_a_trajectory_is_named(run, given, kind):
+    status, _, message = run("torques", PANDA, given)
+    assert status == 2
+    assert f"{given}: is a {kind}; a trajectory is needed" in message
+    assert "convert" not in message
+
+
 def test_what_a_file_is_its_content_tells(run, tmp_path):
     robot = tmp_path / "arm.yaml"
     robot.write_text((EXAMPLES / "robots" / "scara.urdf").read_text())

@@ -97,4 +97,6 @@ def explaining_other_kinds(path: str | PathLike[str], *kinds: str) -> Iterator[N
         if kind is None or kind in kinds:
             raise
         advice = ADVICE[kind].format(path=path, stem=Path(fspath(path)).stem)
+        if kinds == ("trajectory",) and kind in ("mechanism", "robot"):
+            advice = f"is a {kind}; a trajectory is needed: times and positions of joints (.csv), or laws of joints"
         raise type(error)(advice, path=path) from None
