@@ -217,3 +217,17 @@ def test_a_table_has_no_times_for_what_is_constant():
     moving = dataclasses.replace(fixed, output="C_y", maximum=4.0)
     shown = {row[0]: row[3:] for row in peaks_table([fixed, moving]).rows}
     assert shown == {"C_x": ["0", "-", "0", "-"], "C_y": ["0", "0.25", "4", "0.75"]}
+
+
+@pytest.mark.parametrize("count", [2, 41, 201, 203])
+def test_of_two_equal_peaks_the_earlier_is_named(count):
+    swing = jn.Mechanism(
+        space="planar",
+        bodies={"arm": jn.Body(position=[0.0, 0.0])},
+        joints={"O": jn.planar.Revolute(("ground", "arm"), point_i=[0, 0], point_j=[0, 0])},
+        drivers={"theta": jn.drivers.CoordinateDriver(("ground", "arm"), "angle", motion="0.1 + sin(2*pi*t)")},
+        outputs={"theta": jn.outputs.AngleOutput("arm")},
+    )
+    for order, peak in enumerate(peaks(jn.solve(swing, np.linspace(0.0, 1.9, count), order=4))):
+        top, bottom = (1.0 - order) / 4 % 1.0, (3.0 - order) / 4 % 1.0  # sin(2 pi t + order pi/2) is 1 and -1
+        assert (peak.maximum_at, peak.minimum_at) == pytest.approx((top, bottom), abs=1e-4)

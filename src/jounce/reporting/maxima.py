@@ -11,12 +11,13 @@ Times = Float[np.ndarray, " time"]
 Curves = Float[np.ndarray, "time curves"]
 Peaks = Float[np.ndarray, "peaks curves"]
 ALIKE = 1e-6  # fraction of the largest value of a curve
+ROUNDING = 1e-9  # fraction of the scale of a curve, within which maxima are equal
 
 
 class RunningMaxima:
     """The largest values and the highest local maxima of curves that arrive in chunks.
 
-    Curves are -inf where unknown.
+    Curves are -inf where unknown. Of maxima that differ only by rounding the earlier one is preferred.
 
     Attributes
     ----------
@@ -37,13 +38,14 @@ class RunningMaxima:
 
     def add(self, time: Times, values: Curves, scales: Float[np.ndarray, " curves"]) -> None:
         """Add the next chunk."""
-        top, every = np.argmax(values, axis=0), np.arange(values.shape[1])
+        self.scales = scales if self._ends is None else np.maximum(self.scales, scales)
+        top, every = largest_indices(self._rounded(local_heights(values)), 1)[0], np.arange(values.shape[1])
         largest = values[top, every]
         if self._ends is None:
-            self.times, self.sizes, self.scales = time[top], largest, scales
+            self.times, self.sizes = time[top], largest
         else:
             self.times = np.where(largest > self.sizes, time[top], self.times)
-            self.sizes, self.scales = np.maximum(self.sizes, largest), np.maximum(self.scales, scales)
+            self.sizes = np.maximum(self.sizes, largest)
             time, values = np.concatenate([self._ends[0], time]), np.concatenate([self._ends[1], values])
         self._maxima = self._local_maxima(time, values, ends=False)
         self._ends = time[-2:], values[-2:].copy()
@@ -62,7 +64,7 @@ class RunningMaxima:
         if not len(height):
             return self._maxima
         indices = np.arange(len(time))[inner]
-        top = largest_indices(height, self._count)
+        top = largest_indices(self._rounded(height), self._count)
         index = indices[top]
         heights = np.take_along_axis(height, top, axis=0)
         for k in range(1, self._count):  # a maximum listed twice for lack of others counts once
@@ -74,9 +76,14 @@ class RunningMaxima:
         ]
         if self._maxima:
             both = [np.concatenate(pair) for pair in zip(self._maxima, candidates, strict=True)]
-            order = np.argsort(-both[0], axis=0, kind="stable")[: self._count]  # the earlier one of equal maxima
+            order = np.argsort(-self._rounded(both[0]), axis=0, kind="stable")[: self._count]
             candidates = [np.take_along_axis(x, order, axis=0) for x in both]
         return candidates
+
+    def _rounded(self, heights: Curves) -> Curves:
+        """Return heights to multiples of their rounding, so that maxima of one height are equal."""
+        step = ROUNDING * self.scales
+        return np.where(step > 0, np.rint(heights / np.where(step > 0, step, 1.0)) * step, heights)
 
 
 def alike(first: Curves, second: Curves) -> bool:

@@ -17,7 +17,7 @@ from jounce.mechanism import AbstractQuantity
 from jounce.mechanism.laws.law_breaks import breaks_of_laws
 from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.user_code import holds_users_code
-from jounce.reporting.maxima import Curves, Peaks, RunningMaxima, Times, alike
+from jounce.reporting.maxima import ROUNDING, Curves, Peaks, RunningMaxima, Times, alike
 from jounce.trajectory.law_checks.breaks import both_sides
 from jounce.units.shown_units import ShownUnits, derivative_unit
 
@@ -28,7 +28,7 @@ NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
 LEAST = 200  # least number of sampled instants
 PEAKS, POINTS, ROUNDS = 2, 7, 3  # refined maxima of each curve, instants around each, and number of refinements
 CHUNK, COMPARED = 1000, 50  # instants solved together, and compared
-SMALLEST, ALIKE, ROUNDING = 1e-15, 1e-12, 1e-9  # fractions of the size of an output
+SMALLEST, ALIKE = 1e-15, 1e-12  # fractions of the size of an output
 _Around = Float[np.ndarray, "points peaks curves"]
 
 
@@ -268,27 +268,30 @@ def _extremes(
     """Return the instant and size of the maximum of each curve, (2 curves,): negated curves first, then curves.
 
     Around the highest instants, the best of a few points becomes the center of a shorter interval, repeatedly; the last
-    evaluation is at the vertex of the parabola through three points.
+    evaluation is at the vertex of the parabola through three points. Of equal ones the earliest counts.
     """
     times, sizes = maxima.times.copy(), maxima.sizes.copy()
     rounding = ROUNDING * maxima.scales
     changed = _has_changed(motion)
     breaks, sides, one_sided = _one_sided(motion)
     if len(sides) and not changed:
-        _keep_best(times, sizes, 0 * rounding, np.repeat(breaks[:, None], len(sizes), axis=1), one_sided)
+        _keep_best(times, sizes, 0.0, np.repeat(breaks[:, None], len(sizes), axis=1), one_sided)
     if refine and len(motion.time) > 1 and not changed:
         low, high = _around_maxima(motion, maxima)
         share = np.linspace(0.0, 1.0, POINTS)[:, None, None]
-        near = []
+        best, near = (low.copy(), np.full(low.shape, -np.inf)), []
         for _ in range(ROUNDS):
             around = low + share * (high - low)
             own = _own(motion, around)
-            _keep_best(times, sizes, rounding, around, own)
+            _keep_best(*best, 0.0, around, own)
             top = np.clip(np.argmax(own, axis=0), 1, POINTS - 2)
             near = [np.take_along_axis(own, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 0, 1)]
             low, high = (np.take_along_axis(around, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 1))
         vertex = _vertex(low, high, *near)[None]
-        _keep_best(times, sizes, rounding, vertex, _own(motion, vertex))
+        _keep_best(*best, 0.0, vertex, _own(motion, vertex))
+        equal = best[1] >= best[1].max(axis=0) - rounding
+        first = np.argmin(np.where(equal, best[0], np.inf), axis=0)[None]
+        _keep_best(times, sizes, rounding, *(np.take_along_axis(x, first, axis=0) for x in best))
     solved = np.isfinite(sizes)
     return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
 
@@ -375,20 +378,17 @@ def _scales(motion: Motion) -> Float[np.ndarray, " curves"]:
 
 
 def _keep_best(
-    times: Float[np.ndarray, " curves"],
-    sizes: Float[np.ndarray, " curves"],
-    rounding: Float[np.ndarray, " curves"],
-    around: Float[np.ndarray, "..."],
-    own: Float[np.ndarray, "..."],
+    times: Float[np.ndarray, "*curves"],
+    sizes: Float[np.ndarray, "*curves"],
+    rounding: Float[np.ndarray, " curves"] | float,
+    around: Float[np.ndarray, "points *curves"],
+    own: Float[np.ndarray, "points *curves"],
 ) -> None:
     """Replace maxima by values that are larger by more than rounding, so that requested instants are preferred."""
-    flat = own.reshape(-1, own.shape[-1])
-    every = np.arange(own.shape[-1])
-    top = np.argmax(flat, axis=0)
+    time, size = (np.take_along_axis(x, np.argmax(own, axis=0)[None], axis=0)[0] for x in (around, own))
     with np.errstate(invalid="ignore"):
-        better = flat[top, every] > sizes + rounding
-    times[better] = around.reshape(flat.shape)[top, every][better]
-    sizes[better] = flat[top, every][better]
+        better = size > sizes + rounding
+    times[better], sizes[better] = time[better], size[better]
 
 
 def _vertex(low: Peaks, high: Peaks, *near: Peaks) -> Peaks:
