@@ -14,7 +14,7 @@ from jounce.integrate.marching.exact_numbers import ExactNumbers
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
 from jounce.integrate.marching.marching import Outcome, RunLimits, steps_between_looks
 from jounce.integrate.marching.robot_marching import STUCK, Progress, RobotProblem, RobotSteps, march_robot
-from jounce.integrate.marching.robot_state import RobotState, at, start_levels
+from jounce.integrate.marching.robot_state import RobotState, start_levels
 from jounce.integrate.marching.runs import AbstractRun
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.steps.methods import AbstractMethod, Taylor
@@ -222,9 +222,11 @@ class RobotRun(AbstractRun):
     ) -> Float[np.ndarray, "joint point"]:
         """Return the laws of driven joints minus their coordinates at shares of steps, rad or sizes of the robot."""
         since = shares * steps.length[which]
-        path = at(jax.tree.map(lambda part: np.moveaxis(part[which], 0, -1), steps.polynomial), since).coordinates
-        laws = self.problem.prescribed_series(path, (steps.start[which] + since)[None], 0)[0]
-        deviation = np.asarray(self.problem.equations.driven)[:, None] * (np.asarray(laws) - np.asarray(path))
+        path = np.zeros((len(self.problem.scale), len(since)))
+        for coefficient in np.moveaxis(steps.polynomial.coordinates, 0, -1)[::-1]:
+            path = path * since + coefficient[:, which]
+        laws = np.asarray(self.problem.prescribed((steps.start[which] + since)[None], path, path))
+        deviation = np.asarray(self.problem.equations.driven)[:, None] * (laws - path)
         return deviation / np.asarray(self.problem.scale)[:, None]
 
     def initial_step(self) -> RobotSteps:
