@@ -5,6 +5,7 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from mpmath import mp
 
 import jounce as jn
 from jounce import drivers, planar
@@ -125,39 +126,100 @@ def test_dead_center_touched_by_the_law_is_a_change_point():
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], angle, atol=1e-9)
 
 
-@pytest.mark.parametrize("order", [0, 4, 6])
-@pytest.mark.parametrize(
-    "instants", [[0, 0.3, 0.5, 0.7], [0, 0.3, 0.45, 0.55, 0.7], [0.49, 0.5, 0.7], np.linspace(0, 1, 11)]
-)
-def test_motion_that_turns_back_at_a_change_point_ends_there(order, instants):
-    """The determinant has a double zero, where rounding would choose the branch: x = 0, or as the crank goes on."""
-    law, time = "pi/2 - 0.5*(t - 0.5)**2", np.array(instants, float)
-    crank_angle = np.pi / 2 - 0.5 * (time - 0.5) ** 2
-    turned = drivers.CoordinateDriver(("ground", "crank"), "angle", motion=law)
-    bodies = {"crank": jn.Body([0, 0], 1.4), "rod": jn.Body([0.17, 0.98], -1.4), "slider": jn.Body([0.34, 0])}
+BESIDE = np.array([1e-3, 1e-4, 1e-6, 1e-9, 1e-12])
+
+
+def folding_slider_crank(angle, time, start=1.4):
+    """Crank and rod of length one, which can fold at an angle of pi/2: then x = 2 cos(angle), or stays zero."""
+    bodies = {
+        "crank": jn.Body([0, 0], start),
+        "rod": jn.Body([np.cos(start), np.sin(start)], -start),
+        "slider": jn.Body([2 * np.cos(start), 0]),
+    }
     joints = {
         "A": planar.Revolute(("ground", "crank"), [0, 0], [0, 0]),
         "B": planar.Revolute(("crank", "rod"), [1, 0], [0, 0]),
         "C": planar.Revolute(("rod", "slider"), [1, 0], [0, 0]),
         "guide": planar.Prismatic(("ground", "slider"), [0, 0], [0, 0], [1, 0], [1, 0]),
     }
+    turned = drivers.CoordinateDriver(("ground", "crank"), "angle", motion=angle)
     outputs = {"x": jn.outputs.PointOutput("slider", [0, 0])}
-    mechanism = jn.Mechanism(
+    return jn.Mechanism(
         space="planar", bodies=bodies, joints=joints, drivers={"turn": turned}, outputs=outputs, time=time
     )
-    motion = jn.solve(mechanism, order=order, strict=False)
-    before = time < 0.5
-    np.testing.assert_array_equal(motion.status == Status.OK, before)
-    assert motion.status[~before][0] == Status.SINGULAR
-    np.testing.assert_allclose(motion.outputs["x"][before, 0, 0], 2 * np.cos(crank_angle[before]), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("order", [2, 4])
-def test_parallelogram_that_turns_back_where_it_is_flat_ends_there(order):
-    turning = four_bar("0.5", "0.5", "0.5*(t - 0.5)**2", AB=0.05, CD=0.05, AD=0.2, BC=0.2)
-    motion = jn.solve(turning, [0, 0.3, 0.5, 0.7], order=order, strict=False)
-    assert motion.status.tolist() == [Status.OK, Status.OK, Status.SINGULAR, Status.NOT_REACHED]
-    np.testing.assert_allclose(motion.outputs["psi"][:2, :3], [[0.125, -0.5, 1], [0.02, -0.2, 1]], atol=1e-11)
+def sine_of_parabola(offset, time, order):
+    """Return the derivatives of 2 sin(s^2 / 2 - offset), s = time - 1/2, by series in thirty digits."""
+    with mp.workdps(30):
+        series = [
+            mp.taylor(lambda t: 2 * mp.sin((t - mp.mpf("0.5")) ** 2 / 2 - mp.mpf(offset)), x, order) for x in time
+        ]
+        return np.array([[float(c * mp.factorial(k)) for k, c in enumerate(one)] for one in series])
+
+
+@pytest.mark.parametrize("order", [0, 4, 6])
+@pytest.mark.parametrize(
+    "instants", [[0.0, 0.3, 0.5, 0.7], [0.3, 0.5, 0.7], [*np.linspace(0, 1, 11), *(0.5 - BESIDE), *(0.5 + BESIDE)]]
+)
+def test_motion_that_turns_back_at_a_change_point_goes_on_along_its_series(order, instants):
+    """The determinant has a double zero; x = 2 cos(angle) is analytic in time, and x = 0 afterwards is not."""
+    time = np.sort(np.array(instants))
+    motion = jn.solve(folding_slider_crank("pi/2 - 0.5*(t - 0.5)**2", time), order=order)
+    np.testing.assert_allclose(motion.change_points, [0.5], atol=1e-9)
+    limits = (1e-11, 1e-10, 1e-9, 1e-7, 1e-6, 1e-6, 1e-6)
+    truth = sine_of_parabola(0.0, time, order)
+    for k in range(order + 1):
+        np.testing.assert_allclose(motion.outputs["x"][:, k, 0], truth[:, k], rtol=0, atol=limits[k])
+
+
+@pytest.mark.parametrize("offset", [1e-4, 1e-6, 1e-9, 1e-12, -1e-12, -1e-9, -1e-6, -1e-4])
+def test_motion_that_turns_back_just_beyond_or_before_a_change_point(offset):
+    """Two simple zeros, or none, a little apart: the continuation in time is the same as from a double zero."""
+    time = np.linspace(0, 1, 21)
+    motion = jn.solve(folding_slider_crank(f"pi/2 + {offset} - 0.5*(t - 0.5)**2", time), order=2)
+    truth = sine_of_parabola(offset, time, 2)
+    np.testing.assert_allclose(motion.outputs["x"][:, :, 0], truth, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("order", [0, 4, 6, 8])
+@pytest.mark.parametrize("sign", ["", "-"])
+def test_parallelogram_that_turns_back_where_it_is_flat(order, sign):
+    time = np.sort(np.r_[np.linspace(0, 1, 11), 0.5 - BESIDE, 0.5 + BESIDE])
+    turning = four_bar(f"{sign}0.125", f"{sign}0.125", f"{sign}0.5*(t - 0.5)**2", AB=0.05, CD=0.05, AD=0.2, BC=0.2)
+    motion = jn.solve(turning, time, order=order)
+    s, still = time - 0.5, np.zeros((max(order - 2, 0), len(time)))
+    truth = float(sign + "1") * np.stack([s**2 / 2, s, np.ones(len(time)), *still][: order + 1], axis=1)
+    limits = (1e-11, 1e-10, 1e-9, 1e-7, 1e-6, 1e-6, 1e-5, 1e-4, 1e-3)
+    for k in range(order + 1):
+        np.testing.assert_allclose(motion.outputs["psi"][:, k], truth[:, k], rtol=0, atol=limits[k])
+
+
+@pytest.mark.parametrize("power", [3, 4, 5])
+@pytest.mark.parametrize("order", [0, 4, 6, 8])
+def test_motion_that_rests_at_a_change_point_ends_before_rounding_chooses_its_branch(order, power):
+    """Toward a zero of multiplicity three and more the branches are closer than positions are certain."""
+    time = np.sort(np.r_[np.linspace(0, 1, 21), 0.5 - BESIDE, 0.5 + BESIDE])
+    start = 0.5 * (-0.5) ** power
+    resting = four_bar(f"{start}", f"{start}", f"0.5*(t - 0.5)**{power}", AB=0.05, CD=0.05, AD=0.2, BC=0.2)
+    motion = jn.solve(resting, time, order=order, strict=False)
+    solved = motion.status == Status.OK
+    assert not solved[time >= 0.5].any()
+    assert motion.status[~solved][0] == Status.SINGULAR
+    np.testing.assert_allclose(
+        motion.outputs["psi"][solved, 0], 0.5 * (time[solved] - 0.5) ** power, rtol=0, atol=1e-11
+    )
+    if order:
+        rate = 0.5 * power * (time[solved] - 0.5) ** (power - 1)
+        np.testing.assert_allclose(motion.outputs["psi"][solved, 1], rate, rtol=0, atol=1e-9)
+
+
+def test_near_parallelogram_with_a_dead_point_where_it_turns_back_ends_there():
+    """A coupler longer by 1e-11 m leaves a gap of 1e-5 rad in the range of the crank, which the law enters."""
+    time = np.linspace(0, 1, 21)
+    turning = four_bar("0.125", "0.125", "0.5*(t - 0.5)**2", AB=0.05, CD=0.05, AD=0.2, BC=0.2 + 1e-11)
+    motion = jn.solve(turning, time, order=2, strict=False)
+    np.testing.assert_array_equal(motion.status == Status.OK, time < 0.5)
 
 
 @pytest.mark.parametrize("missed", [0.01, 1e-3])

@@ -1,8 +1,9 @@
 """Instants near a change point, interpolated from the motion on both sides.
 
 At a change point the Jacobian is singular, and derivatives near it lose digits: at a time distance of d radii of the
-Taylor series, a derivative of order k has an error of about ``eps k! / d^(k + 1)``. The motion itself is smooth there.
-Accurate jets a little way off on both sides determine the motion in between by two-point Hermite interpolation.
+Taylor series, a derivative of order k has an error of about ``eps k! / d^(k + m)``, where m is the multiplicity of the
+zero of the determinant. The motion itself is smooth there. Accurate jets a little way off on both sides determine the
+motion in between by two-point Hermite interpolation.
 """
 
 import math
@@ -13,7 +14,8 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jounce.kinematics.continuation.path_following import Anchor, ChangePoint, FollowedPath, follow
+from jounce.kinematics.continuation.anchors import Anchor, ChangePoint
+from jounce.kinematics.continuation.path_following import FollowedPath, follow
 from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.status import Status
 
@@ -26,13 +28,13 @@ LARGEST_DISAGREEMENT = 1e-7  # between interpolated and solved positions, rad or
 
 def half_width(point: ChangePoint, order: int) -> float:
     """Return the distance from a change point at which interpolation is as accurate as the jets at its ends, s."""
-    balance = (ROUNDING * math.factorial(order) / TRUNCATION) ** (1 / (2 * order + 3))
+    balance = (ROUNDING * math.factorial(order) / TRUNCATION) ** (1 / (2 * order + 2 + point.multiplicity))
     return point.radius * min(LARGEST_WIDTH, balance)
 
 
 def spoiled_width(point: ChangePoint, order: int) -> float:
     """Return the distance from a change point within which rounding dominates derivatives of an order, s."""
-    return point.radius * (ROUNDING * math.factorial(order) / LARGEST_NOISE) ** (1 / (order + 1))
+    return point.radius * (ROUNDING * math.factorial(order) / LARGEST_NOISE) ** (1 / (order + point.multiplicity))
 
 
 def spoiled(

@@ -12,15 +12,23 @@ import itertools
 from collections.abc import Sequence
 from functools import partial
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.execution.backends import backend_of
+from jounce.kinematics.continuation.anchors import (
+    DOUBLE_ZERO,
+    NEARBY,
+    SIMPLE_ZERO,
+    Anchor,
+    ChangePoint,
+    hidden_zero,
+    multiplicity_ahead,
+)
 from jounce.kinematics.continuation.continuation_steps import StepState, TakenSteps
-from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult
 from jounce.kinematics.continuation.solver import NO_GRID, Solver
 from jounce.kinematics.continuation.step_control import ExpansionPoint, StopReason
 from jounce.kinematics.status import Status
@@ -32,76 +40,11 @@ SMALLEST_STEP = 1e-10  # part of the span
 PASSAGE_ORDER = 4  # of the series through a change point; rounding spoils higher derivatives near it
 PASSAGE_DEVIATION = 1e-8  # relative: two branches separated by a gap g deviate from that series by (g / distance)^2
 NEARLY_SINGULAR = 1e-6  # part of the span: a motion that stops this close to a singular position ends at it
-SIMPLE_ZERO = 1.6  # largest estimate of the multiplicity of a simple zero of the determinant
+TOUCH_DEVIATION = 2e-5  # the same at a double zero, where rounding is larger, and a gap deviates by (g / distance^2)^2
 TOUCHING = 1e-3  # radii: nearer to a multiple zero, positions are as uncertain as the branches are far apart
 LEAST_PASSAGE = 0.2  # part of the distance to a change point by which the motion must continue beyond it
-NEARBY = 0.1  # radii: closer singular positions spoil high derivatives of a smooth motion
 INSTANT = attrgetter("instant")  # of an anchor
 SAMPLES_A_STEP = 8  # attitudes per step for counting turns: no body turns by half a turn between two of them
-
-
-class Anchor(NamedTuple):
-    """A solved instant of a followed motion, with the reach of its Taylor series.
-
-    Attributes
-    ----------
-    instant : float
-        Time, s.
-    states, lane, structure
-        Leaves of the states of several anchors, the index of this one, and the tree structure of a state; most states
-        are never built.
-    safe_step, radius : float
-        Reach of the Taylor series, s: by all its terms, and by the time at which the first three terms grow to one.
-    det_rate : float
-        Rate at which the Jacobian approaches a singular one (below zero) or leaves it, 1/s.
-    status : Status
-        OK, or UNDEFINED if an output has no finite value; the motion continues there.
-    """
-
-    instant: float
-    states: Sequence[np.ndarray]
-    lane: int
-    structure: Any
-    safe_step: float
-    radius: float
-    det_rate: float
-    status: Status
-
-    @property
-    def leaves(self) -> list[np.ndarray]:
-        """Leaves of the state."""
-        return [x[..., self.lane : self.lane + 1] for x in self.states]
-
-    @property
-    def state(self) -> SolvedState:
-        """Jets of the coordinates and outputs, and the sign of the determinant of the Jacobian."""
-        return jax.tree.unflatten(self.structure, self.leaves)
-
-    @classmethod
-    def of(cls, arrival: StepResult, instant: float) -> "Anchor":
-        """Return the anchor of the first lane of a batch that was searched for singular positions."""
-        safe_step, radius, det_rate = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.det_rate))
-        status = Status(int(arrival.status[0]))
-        leaves, structure = jax.tree.flatten(arrival.state(slice(1)))
-        return cls(float(instant), leaves, 0, structure, safe_step, radius, det_rate, status)
-
-    @property
-    def expansion_point(self) -> tuple[float, float, float, float]:
-        """Instant, safe step, radius and rate of the determinant."""
-        return self.instant, self.safe_step, self.radius, self.det_rate
-
-    @property
-    def reach(self) -> float:
-        """Time to or from the nearest singular position, to first order, s."""
-        return 1 / abs(self.det_rate) if abs(self.det_rate) > 0 else np.inf
-
-
-@dataclasses.dataclass(frozen=True)
-class ChangePoint:
-    """A singular position that a motion passes smoothly: instant, s, and radius of the Taylor series there, s."""
-
-    instant: float
-    radius: float
 
 
 @dataclasses.dataclass
@@ -119,6 +62,7 @@ class FollowedPath:
     status: Status = Status.OK
     ended_at: float = np.inf
     fault: str = ""
+    hidden: ChangePoint | None = None  # multiple zero of the determinant at which the path ends
     backends: set[str] = dataclasses.field(default_factory=set)
 
     def add(self, done: TakenSteps, first: int) -> None:
@@ -150,10 +94,22 @@ class FollowedPath:
         self.status, self.ended_at, self.fault = status, instant, fault
         return self
 
+    def ended_at_multiple_zero(self, first: int, grid: Float[np.ndarray, " time"], drivers: Sequence[str]) -> bool:
+        """End the path at the first of its anchors, from an index on, at which rounding hides a multiple zero ahead."""
+        for k in range(max(first, 2), len(self.anchors)):
+            point = hidden_zero(self.anchors[k - 2 : k + 1])
+            if point is not None:
+                del self.anchors[k + 1 :]
+                self.hidden, beyond = point, float(np.nextafter(self.anchors[k].instant, np.inf))
+                self.is_solved[grid >= beyond] = False
+                self.ended(Status.SINGULAR, beyond, ", ".join(drivers))
+                return True
+        return False
+
     def singular_positions_outside(self) -> list[ChangePoint]:
         """Return singular positions just before the start or just after the end that the motion would pass smoothly."""
         first = self.anchors[0]
-        points = self._just_ahead() if self.status == Status.OK else []
+        points = self._just_ahead() if self.status == Status.OK else [self.hidden] if self.hidden else []
         if _is_just_behind(first):
             points.append(ChangePoint(first.instant - first.reach, first.radius))
         return points
@@ -235,7 +191,10 @@ def follow(
     first, path.is_solved = 0, np.zeros(len(grid), bool)
     while not path.anchors or path.anchors[-1].instant < stop:
         done = solver.take_steps(run, grid[first:], stop, SMALLEST_STEP * span)
+        known = len(path.anchors)
         path.add(done, first)
+        if path.ended_at_multiple_zero(known, grid, solver.model.drivers):
+            return path
         run = done.run
         if not path.anchors:
             arrival = jax.tree.map(np.asarray, done.last)
@@ -245,11 +204,12 @@ def follow(
         ending = int(control.ending)
         first += int(run.next_up)
         if ending == StopReason.PASSAGE:
-            multiplicity = _zero_ahead(path.anchors)
+            multiplicity = multiplicity_ahead(path.anchors)
             if multiplicity > SIMPLE_ZERO and last.reach < TOUCHING * last.radius:
                 beyond = float(np.nextafter(last.instant, np.inf))
+                path.hidden = ChangePoint(last.instant + 2 * last.reach, last.radius, 2)
                 return path.ended(Status.SINGULAR, beyond, ", ".join(solver.model.drivers))
-            passed = _far_side(solver, last, stop) if multiplicity <= SIMPLE_ZERO else None
+            passed = _far_side(solver, last, multiplicity, stop) if multiplicity <= DOUBLE_ZERO else None
             if passed is None:
                 no = np.zeros((), bool)
                 control = control._replace(may_pass=no, ending=np.asarray(int(StopReason.UNFINISHED)))
@@ -284,41 +244,33 @@ def _end_path(solver: Solver, path: FollowedPath, done: TakenSteps, span: float)
     return path.ended(status, target, solver.fault(arrival, 0))
 
 
-def _zero_ahead(anchors: Sequence[Anchor]) -> float:
-    """Return the estimated multiplicity of the zero of the determinant ahead; NaN before two anchors approach it.
-
-    A multiple zero, as where a driver turns back, is farther away than its rate says: a passage by that rate would end
-    at the zero itself, where rounding chooses the branch.
-    """
-    if len(anchors) < 2 or not anchors[-2].det_rate < 0:
-        return np.nan
-    before, last = anchors[-2:]
-    lost = before.reach - last.reach
-    return (last.instant - before.instant) / lost if lost > 0 else np.inf
-
-
-def _far_side(solver: Solver, near_side: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
+def _far_side(solver: Solver, near_side: Anchor, estimate: float, stop: float) -> tuple[Anchor, ChangePoint] | None:
     """Return the anchor beyond a change point just ahead, and the change point; None if there is none to pass.
 
     The far anchor is as distant from the change point as this one. It must lie on the series to rounding, and the
     Jacobian must leave the singular position as fast as it approached it. Neither holds at a dead point, or where two
-    branches only come close.
+    branches only come close. The multiplicity of the zero of the determinant is one or two, by its `estimate`; where
+    the motion turns back near the change point, a pair of zeros, real or complex, is as good as a double one.
     """
-    middle = near_side.instant + near_side.reach
-    target = min(middle + near_side.reach, stop)
-    if target - middle < LEAST_PASSAGE * near_side.reach:
+    multiplicity = 1 if estimate <= SIMPLE_ZERO else 2
+    distance = multiplicity * near_side.reach
+    middle = near_side.instant + distance
+    target = min(middle + distance, stop)
+    if target - middle < LEAST_PASSAGE * distance:
         return None  # the motion stops before
     coordinates, outputs, sign = near_side.state
     shortened = jax.tree.map(_shortened, (coordinates, outputs))
-    source = (*shortened, np.zeros_like(sign))  # the sign may change
+    source = (*shortened, np.zeros_like(sign) if multiplicity == 1 else sign)  # at a simple zero the sign may change
     arrival = solver(solver.needed(source), np.array([target - near_side.instant]), np.array([target]), search=True)
     beyond = Anchor.of(arrival, target)
-    if arrival.status[0] not in PASSABLE or not arrival.deviation[0] <= PASSAGE_DEVIATION:
+    largest = PASSAGE_DEVIATION if multiplicity == 1 else TOUCH_DEVIATION
+    if arrival.status[0] not in PASSABLE or not arrival.deviation[0] <= largest:
         return None
-    if not (beyond.det_rate > 0 and abs(beyond.reach - (target - middle)) <= 0.5 * (target - middle)):
+    since = multiplicity * beyond.reach
+    if not (beyond.det_rate > 0 and abs(since - (target - middle)) <= 0.5 * (target - middle)):
         return None
-    located = 0.5 * (middle + target - beyond.reach)  # first-order errors of the two sides cancel
-    return beyond, ChangePoint(located, min(near_side.radius, beyond.radius))
+    located = 0.5 * (middle + target - since)  # first-order errors of the two sides cancel
+    return beyond, ChangePoint(located, min(near_side.radius, beyond.radius), multiplicity)
 
 
 def within_steps(times: Float[np.ndarray, " anchor"], count: int) -> Float[np.ndarray, " time"]:

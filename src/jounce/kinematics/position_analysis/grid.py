@@ -18,9 +18,10 @@ from jaxtyping import Bool, Float, Int
 from jounce.execution.buffer_pool import arrays_in, bytes_needed, lend
 from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
+from jounce.kinematics.continuation.anchors import ChangePoint
 from jounce.kinematics.continuation.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult
-from jounce.kinematics.continuation.path_following import OK, PASSABLE, ChangePoint, FollowedPath, follow
+from jounce.kinematics.continuation.path_following import OK, PASSABLE, FollowedPath, follow
 from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
 from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, blocks_for, neighbors, solve_blocks, stride_of
 from jounce.kinematics.status import Status

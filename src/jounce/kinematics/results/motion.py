@@ -16,7 +16,7 @@ from jounce.execution.backends import xla_backend
 from jounce.execution.on_demand import OnDemand, read_only_arrays
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import shifted_by_turns
-from jounce.kinematics.continuation.path_following import ChangePoint
+from jounce.kinematics.continuation.anchors import ChangePoint
 from jounce.kinematics.results.pose_outputs import check_output, output_group, series_along
 from jounce.kinematics.results.tables import Tabulated
 from jounce.kinematics.status import Status
