@@ -142,21 +142,23 @@ def _is_just_behind(point: "Anchor | ExpansionPoint") -> Any:
     return (point.det_rate > 0) & (point.det_rate * point.radius > 1 / NEARBY)
 
 
+def _is_just_ahead(point: "Anchor | ExpansionPoint") -> Any:
+    """Return whether a singular position lies just ahead of an expansion point."""
+    return (point.det_rate < 0) & (-point.det_rate * point.radius > 1 / NEARBY)
+
+
 def _is_just_beyond(point: "Anchor | ExpansionPoint", end: float) -> Any:
     """Return whether a singular position lies just ahead, and the motion ends near or before it."""
-    near = (point.det_rate < 0) & (-point.det_rate * point.radius > 1 / NEARBY)
-    return near & ((end - point.instant) * -point.det_rate < 1 + LEAST_PASSAGE)
+    return _is_just_ahead(point) & ((end - point.instant) * -point.det_rate < 1 + LEAST_PASSAGE)
 
 
-def is_spoiled_outside(
-    point: ExpansionPoint, begins: Bool[np.ndarray, " lane"], end: float
-) -> Bool[np.ndarray, " lane"]:
-    """Return which motions may be singular just before their start at an expansion point, or just after their end.
+def is_next_to_singular(point: ExpansionPoint, begins: Bool[np.ndarray, " lane"]) -> Bool[np.ndarray, " lane"]:
+    """Return which motions come close to a singular position at an expansion point, or begin close behind one.
 
-    This test is conservative: `singular_positions_outside` finds nothing where it is False.
+    This test is conservative: elsewhere no multiple zero ends a motion, and `singular_positions_outside` finds nothing.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # of failed steps
-        return begins & _is_just_behind(point) | _is_just_beyond(point, end)
+        return begins & _is_just_behind(point) | _is_just_ahead(point)
 
 
 def follow(

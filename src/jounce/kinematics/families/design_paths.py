@@ -17,13 +17,12 @@ from jounce.execution.mapped import at_lanes
 from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import shifted_by_turns
-from jounce.kinematics.continuation.anchors import NEARBY
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.path_following import (
     SAMPLES_A_STEP,
     SMALLEST_STEP,
     blended_attitudes,
-    is_spoiled_outside,
+    is_next_to_singular,
 )
 from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.continuation.step_control import (
@@ -149,11 +148,7 @@ class DesignPaths:
             end_point: Any = ExpansionPoint(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
             begins: Any = control.step == 0
             control, taken = decide((control, arrival.status, end_point))
-            near_zero = (end_point.det_rate < 0) & (
-                end_point.reach < NEARBY * end_point.radius
-            )  # may be a multiple one
-            outside = is_spoiled_outside(end_point, begins, last)
-            unlike = taken & ((arrival.status != Status.OK) | near_zero | outside)
+            unlike = taken & ((arrival.status != Status.OK) | is_next_to_singular(end_point, begins))
             ended = control.ending != StopReason.UNFINISHED
             self.individual[lanes[unlike | ended & (control.ending != StopReason.ARRIVED)]] = True
             reached = solver.needed(arrival.state(slice(None) if taken.all() else taken))
