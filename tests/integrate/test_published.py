@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.special import ellipj
 
 import jounce as jn
@@ -169,6 +170,21 @@ def test_double_four_bar():
         check(motion.outputs["tip"][index][..., k], tables["tip"][axis][:, :3], 1e-6)
     energy_kept(motion, 1e-8, 3.5 * GRAVITY)
     assert np.max(motion.drift) < 1e-13
+
+
+def test_derivatives_next_to_a_singular_position_of_a_simulation():
+    motion = jn.simulate(jn.load(example("double_four_bar")), [0.0, 1.0], 4)
+    level = brentq(lambda t: motion.at([t], 0).outputs["angle"][0, 0], 0.5, 1.0, xtol=1e-15)  # the uprights lie level
+    offsets = np.array([0.0, *(sign * 10.0**-k for k in (12, 10, 8, 7, 6, 5, 4, 3) for sign in (-1, 1))])
+    near = motion.at(level + offsets)
+    angle, speed, *derivatives = near.outputs["angle"].T
+    strength = 3.5 * 9.81 / 3.0  # 3 m l^2 times the acceleration is the torque -3.5 m g l cos(angle)
+    acceleration = -strength * np.cos(angle)
+    jounce = strength * (np.cos(angle) * speed**2 + np.sin(angle) * acceleration)
+    assert (near.status == 0).all()
+    np.testing.assert_allclose(derivatives[0], acceleration, atol=1e-8)
+    np.testing.assert_allclose(derivatives[1], strength * np.sin(angle) * speed, atol=1e-5)
+    np.testing.assert_allclose(derivatives[2], jounce, atol=1e-2)
 
 
 def test_figures_of_the_peer_for_the_double_four_bar_are_of_ten_seconds():

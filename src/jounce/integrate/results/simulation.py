@@ -21,7 +21,7 @@ from jounce.integrate.steps import revolution_counts
 from jounce.integrate.steps.energy_balance import energies
 from jounce.integrate.steps.events import WIDTHS, in_pieces, pose_coordinates, series_of
 from jounce.integrate.steps.lookahead import watched_names
-from jounce.integrate.steps.methods import evaluated
+from jounce.integrate.steps.methods import evaluated, expanded_about, near_singular
 from jounce.integrate.steps.projection import projected
 from jounce.integrate.steps.revolution_counts import POINTS_IN_STEP, AnglesOfForces
 from jounce.jet import Jet
@@ -299,6 +299,8 @@ def expanded(
 ) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...]]:
     """Return the Taylor coefficients of the motion at instants, from the equations of motion.
 
+    Next to a singular position, where rounding decides the coefficients of the equations, they are those of the step.
+
     Parameters
     ----------
     shared : tuple
@@ -324,6 +326,11 @@ def expanded(
     counted = equations.near(revolution_counts.followed(equations, first_angles, polynomial, step).at(step))
     state, _, inverse = projected(counted, evaluated(polynomial, step), instants[None])
     series = expand(counted, state, instants[None], order, inverse).state
+    if len(polynomial.position) > order:  # steps of another solver have fewer coefficients
+        singular, own = near_singular(counted, inverse), expanded_about(polynomial, step, order)
+        series = State(
+            *(jnp.concatenate([x[:1], jnp.where(singular, y, x)[1:]]) for x, y in zip(series, own, strict=True))
+        )
     outputs_found = output_series(outputs, pose_coordinates(series), equations.pose_type)
     return series, revolution_counts.measured(counted, state), outputs_found
 

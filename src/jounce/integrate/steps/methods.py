@@ -105,6 +105,19 @@ def evaluated(polynomial: State, step: Lanes) -> State:
     return polynomial.map(lambda c: _horner(c, step))
 
 
+def expanded_about(polynomial: State, step: Lanes, order: int) -> State:
+    """Return the Taylor coefficients of the polynomials of a state about a time `step` from their beginning."""
+
+    def shifted(coefficients: Any) -> Any:  # Horner's scheme for the value and its derivatives at once
+        def added(levels: Any, coefficient: Any) -> tuple[Any, None]:
+            return levels * step[None, None, None] + jnp.concatenate([coefficient[None], levels[:-1]]), None
+
+        start = jnp.zeros((order + 1, *coefficients.shape[1:]))
+        return jax.lax.scan(added, start, coefficients, reverse=True)[0]
+
+    return polynomial.map(shifted)
+
+
 def _horner(
     coefficients: Float[Numbers, "order component body #batch"], step: Lanes
 ) -> Float[Numbers, "component body batch"]:
