@@ -1,11 +1,9 @@
 """Motion over a kink of a force: the series of both sides meet at the instant at which their accelerations agree."""
 
-import math
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from jounce.dynamics.forward.accelerations import State
 from jounce.integrate.marching.divided_steps import Kinks
@@ -27,21 +25,6 @@ class Kinked(NamedTuple):
 
     series: State
     late: Any
-
-
-def shifted(series: State, step: Any = 0.0) -> State:
-    """Return the first coefficients of series, expanded about a time `step` later."""
-
-    def part(c: Any) -> Any:
-        padded = jnp.concatenate([c, jnp.zeros((KINKED, *c.shape[1:]))])
-        shifted_breaks = []
-        for level in range(KINKED):
-            weights = np.array([math.comb(level + k, level) for k in range(len(c))], float)
-            terms = padded[level : level + len(c)] * weights[:, None, None, None]
-            shifted_breaks.append(evaluated(State(terms, terms, terms, terms), jnp.broadcast_to(step, (1,))).position)
-        return jnp.stack(shifted_breaks)
-
-    return series.map(part)
 
 
 def refined_kink_state(state: State, series: State, length: Any, kinked: Kinked, over: Kinks) -> tuple[State, Any]:

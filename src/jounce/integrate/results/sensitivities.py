@@ -27,13 +27,13 @@ from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.divided_steps import Pieces, divided_steps, series_through
-from jounce.integrate.marching.force_discontinuities import Kinked, refined_kink_state, shifted, with_value
+from jounce.integrate.marching.force_discontinuities import KINKED, Kinked, refined_kink_state, with_value
 from jounce.integrate.marching.smoothness_breaks import Break, breaks
 from jounce.integrate.results.simulation import Simulation
 from jounce.integrate.steps.events import pose_coordinates
 from jounce.integrate.steps.host_calls import called, recorded
 from jounce.integrate.steps.lookahead import watched_names
-from jounce.integrate.steps.methods import Taylor, evaluated
+from jounce.integrate.steps.methods import Taylor, evaluated, expanded_about
 from jounce.integrate.steps.options import instants_of
 from jounce.integrate.steps.projection import normalized
 from jounce.jet import Jet
@@ -291,12 +291,14 @@ def _marched(
         arrived, end = evaluated(expanded, length), time + length
         if over is not None:
             behind, late = refined_kink_state(state, expanded, length, kinked, over)
-            left = Kinked(shifted(expanded, length), jnp.zeros_like(length))
+            left = Kinked(expanded_about(expanded, length, KINKED - 1), jnp.zeros_like(length))
             back = (behind, time, kinked._replace(late=late))
             arrived, end, kinked = jax.tree.map(lambda a, b: jnp.where(over.back, a, b), back, (arrived, end, left))
         return (_corrected(equations, arrived, end[None]), kinked), state
 
-    none = None if kinks is None else Kinked(shifted(start.map(lambda part: part[None])), jnp.zeros(1))
+    none = None
+    if kinks is not None:
+        none = Kinked(expanded_about(start.map(lambda part: part[None]), jnp.zeros(1), KINKED - 1), jnp.zeros(1))
     path = starts, lengths, known.map(lambda part: part[..., None]), used, kinks
     _, states = jax.lax.scan(march, (start, none), path)
     chosen_states = states.map(lambda part: jnp.moveaxis(part[chosen, ..., 0], 0, -1))
