@@ -5,9 +5,10 @@ import json
 
 import numpy as np
 import pytest
+import xarray
 
 import jounce as jn
-from jounce.reporting.peaks import Peak, derivative_name, peaks
+from jounce.reporting.peaks import Peak, derivative_name, peaks, table_peaks
 from jounce.reporting.text.tables import peaks_table
 
 CRANK = jn.Mechanism(
@@ -231,3 +232,15 @@ def test_of_two_equal_peaks_the_earlier_is_named(count):
     for order, peak in enumerate(peaks(jn.solve(swing, np.linspace(0.0, 1.9, count), order=4))):
         top, bottom = (1.0 - order) / 4 % 1.0, (3.0 - order) / 4 % 1.0  # sin(2 pi t + order pi/2) is 1 and -1
         assert (peak.maximum_at, peak.minimum_at) == pytest.approx((top, bottom), abs=1e-4)
+
+
+def test_a_table_names_the_earliest_of_equal_extremes():
+    time = np.linspace(0.0, 1.0, 11)
+    raised = np.where(abs(time - 0.5) < 0.25, 2.0, 0.0)  # a dwell from 0.3 to 0.7 s
+    raised[6] += 5e-16  # rounding, which has no say
+    values = xarray.Dataset({"j": (("time", "derivative"), raised[:, None], {"units": "m"})}, {"time": time})
+    (peak,) = table_peaks(values)
+    assert (peak.minimum, peak.minimum_at) == (0.0, 0.0)
+    assert (peak.maximum, peak.maximum_at) == (raised.max(), time[3])
+    (unsolved,) = table_peaks(values.where(False))
+    assert np.isnan([unsolved.minimum, unsolved.maximum, unsolved.minimum_at, unsolved.maximum_at]).all()

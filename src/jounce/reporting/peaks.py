@@ -185,16 +185,16 @@ def table_peaks(dataset: xarray.Dataset, one_sided: xarray.Dataset | None = None
         unit = variable.attrs["units"]
         both = (variable, *(() if one_sided is None else (one_sided[name],)))
         for order, given in enumerate(np.concatenate([x.transpose(*coords).values for x in both]).T):
-            solved = np.flatnonzero(np.isfinite(given))
-            values = given if solved.size else np.full_like(given, np.nan)
-            low, high = (int(solved[pick(given[solved])]) if solved.size else 0 for pick in (np.argmin, np.argmax))
-            extremes = [(float(values[k]), float(times[k])) for k in (low, high)]
-            (least, least_at), (most, most_at) = extremes
+            values, instants = (x[np.isfinite(given)] for x in (given, times))
+            size = float(np.abs(values).max(initial=0.0))
+            low = high = (np.nan, np.nan)
+            if values.size:  # of equal extremes the earliest counts
+                low, high = (
+                    (float(x), float(instants[np.abs(values - x) <= ROUNDING * size].min()))
+                    for x in (values.min(), values.max())
+                )
             quantity = derivative_name(order) if unit in ("m", "rad") else effort_name(unit, order)
-            size = float(np.abs(values[solved]).max(initial=0.0))
-            peaks_found.append(
-                Peak(str(name), quantity, derivative_unit(unit, order), least, least_at, most, most_at, size)
-            )
+            peaks_found.append(Peak(str(name), quantity, derivative_unit(unit, order), *low, *high, size))
     return peaks_found
 
 
