@@ -12,12 +12,20 @@ import pytest
 import jounce as jn
 from jounce.errors import ExpressionError, JounceError, UnitError
 from jounce.trajectory import Expression
-from jounce.units.dimensions import KINDS, check_dimension, describe_dimension
+from jounce.units.dimensions import KINDS, check_dimension, describe_dimension, dimension_of, si_unit
 from jounce.units.table import COMMON
 from jounce.units.values import parse_unit, parse_value
 
 REGISTRY = pint.UnitRegistry()
 LENGTH, ANGLE, TIME = (((name, 1),) for name in ("length", "angle", "time"))
+
+
+@hypothesis.given(st.tuples(*[st.integers(-3, 3)] * 4))
+def test_the_unit_of_a_dimension_is_read_back_as_one_of_it(powers):
+    dimension = dimension_of(**dict(zip(("length", "angle", "time", "mass"), powers, strict=True)))
+    if dimension:
+        assert parse_unit(si_unit(dimension)) == (1, dimension)
+        assert parse_value(f"2.5 {si_unit(dimension)}").value == 2.5
 
 
 OWN = {"rev", "U", "r", "tr", "RPM", "mil", "PS", "CV", "kp"}  # what pint takes for something else, or does not know

@@ -22,7 +22,7 @@ from jounce.trajectory import Expression
 from jounce.units.dimensions import Dimension, check_one_of
 from jounce.units.expression import check_parameter_name
 from jounce.units.shown_units import ShownUnits
-from jounce.units.values import parse_value, stated_dimensions
+from jounce.units.values import Value, parse_value, stated_dimensions
 
 GROUND = "ground"
 CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # other kinds contain constraints
@@ -117,8 +117,7 @@ class Mechanism(Displayed):
     forces : dict of str to AbstractForce, optional
         Applied forces and torques, by name; they do not affect prescribed motion.
     initial : dict of str to AbstractConstraint, optional
-        Drivers that hold at the start of a simulation only: the value and the first derivative of their laws give the
-        initial position and velocity.
+        Drivers at the start of a simulation only: their laws give the initial position and velocity.
     outputs : dict of str to AbstractQuantity, optional
         Requested quantities, by name.
     parameters : dict of str to number or str, optional
@@ -145,6 +144,8 @@ class Mechanism(Displayed):
         way.
     dimensions : dict of str to tuple of Dimension, optional
         Dimensions that parameters may have, if known: for a mechanism from a file, by their units and use.
+    stated : frozenset of str, optional
+        Names of the parameters that were given with a unit, and are written with one.
 
     Raises
     ------
@@ -182,6 +183,7 @@ class Mechanism(Displayed):
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
     assembly: Any = None
     dimensions: Mapping[str, tuple[Dimension, ...]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
+    stated: frozenset[str] = dataclasses.field(default=frozenset(), compare=False, repr=False)
 
     def __post_init__(self):
         if self.space not in ("planar", "spatial"):
@@ -195,8 +197,9 @@ class Mechanism(Displayed):
         before = {name: allowed[0] for name, allowed in self.dimensions.items() if len(allowed) == 1}
         known_dimensions = stated_dimensions(texts, before) if texts else before
         if texts:
-            values = {name: self._read(name, text, known_dimensions) for name, text in texts.items()}
-            object.__setattr__(self, "parameters", {**self.parameters, **values})
+            read = {name: self._read(name, text, known_dimensions) for name, text in texts.items()}
+            object.__setattr__(self, "parameters", {**self.parameters, **{n: x.value for n, x in read.items()}})
+            object.__setattr__(self, "stated", self.stated | {n for n, x in read.items() if x.dimension is not None})
         object.__setattr__(self, "outputs", bound(self.outputs, self))
         check_redundant_reactions(self.redundant_reactions, (*self.joints, *self.drivers))
         self._check_assembly()
@@ -204,9 +207,9 @@ class Mechanism(Displayed):
             for name, element in elements.items():
                 self._check_element(kind, name, element)
         self._check_columns()
-        if stated := {name: (x,) for name, x in known_dimensions.items() if name not in self.dimensions}:
+        if new := {name: (x,) for name, x in known_dimensions.items() if name not in self.dimensions}:
             check_stated_units(self, known_dimensions)
-            object.__setattr__(self, "dimensions", {**self.dimensions, **stated})
+            object.__setattr__(self, "dimensions", {**self.dimensions, **new})
         _ = self.shown_units
         for name in MAPPINGS:
             way = "with_parameters" if name == "parameters" else "dataclasses.replace"
@@ -354,8 +357,8 @@ class Mechanism(Displayed):
             check_name("parameter", name, self.parameters, MechanismError, name="parameters")
         return dataclasses.replace(self, parameters={**self.parameters, **values})
 
-    def _read(self, name: str, text: str, dimensions: Mapping[str, Dimension]) -> Any:
-        """Return the value of a parameter given as text, checked against the dimensions that it may have."""
+    def _read(self, name: str, text: str, dimensions: Mapping[str, Dimension]) -> Value:
+        """Read a parameter given as text, and check it against the dimensions that it may have."""
         other_names = [other for other in self.parameters if other != name]
         allowed = self.dimensions.get(name, ())
         try:
@@ -364,7 +367,7 @@ class Mechanism(Displayed):
                 check_one_of(given.dimension, allowed, exactly=not isinstance(given.value, Expression))
         except JounceError as error:
             raise error.located(name=f"parameters.{name}", value=text) from None
-        return given.value
+        return given
 
 
 def names_column(name: str) -> bool:

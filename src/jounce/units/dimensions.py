@@ -66,6 +66,7 @@ KINDS: dict[str, tuple[str, tuple[Dimension, ...]]] = {
 }
 """Kinds of value: a description, and the permitted dimensions (any if empty)."""
 
+_SI_UNITS = {"length": "m", "angle": "rad", "time": "s", "mass": "kg"}
 _WORDS: dict[Dimension, str] = {
     **{powers[0]: words.partition(",")[0] for words, powers in KINDS.values() if len(powers) == 1},
     **{KINDS[kind][1][1]: f"a {kind}" for kind in ("torsional stiffness", "torsional damping")},
@@ -90,6 +91,27 @@ def describe_dimension(dimension: Dimension) -> str:
     over = "*".join(base if power == 1 else f"{base}^{power}" for base, power in dimension if power > 0) or "1"
     under = "/".join(base if power == -1 else f"{base}^{-power}" for base, power in dimension if power < 0)
     return f"{over}/{under}" if under else over
+
+
+def si_unit(dimension: Dimension) -> str:
+    """Return the SI unit of a dimension, as a file states it; empty for a pure number.
+
+    Examples
+    --------
+    >>> si_unit(TORQUE), si_unit(dimension_of(mass=1, time=-1)), si_unit(dimension_of(time=-1))
+    ('N*m', 'N*s/m', '1/s')
+    """
+    powers = dict(dimension)
+    with_force = powers.get("mass") == 1 and "time" in powers
+    parts = (
+        [("N", 1), *times(dimension, FORCE, -1)]
+        if with_force
+        else sorted(dimension, key=lambda entry: entry[0] != "mass")
+    )
+    named = [(_SI_UNITS.get(base, base), power) for base, power in parts]
+    over = "*".join(unit if power == 1 else f"{unit}^{power}" for unit, power in named if power > 0)
+    under = "".join(f"/{unit}" if power == -1 else f"/{unit}^{-power}" for unit, power in named if power < 0)
+    return (over or "1") + under if dimension else ""
 
 
 def check_dimension(dimension: Dimension, kind: str, what: str, *, exactly: bool = True) -> None:

@@ -128,7 +128,7 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
         raise first_problem(source, space, error.errors(include_url=False)) from None
     uses = {name: allowed for name, allowed in context["uses"].items() if allowed}
     dimensions = uses | {name: (dimension,) for name, dimension in context["dimensions"].items()}
-    return _plain(model) | {"dimensions": dimensions}
+    return _plain(model) | {"dimensions": dimensions, "stated": frozenset(context["dimensions"])}
 
 
 def _driven_quantities(drivers: object, space: str) -> dict[str, str]:
@@ -170,6 +170,7 @@ def _build(source: Source, space: str, model: dict[str, Any], locations: _Locati
         units=model["units"],
         assembly=model["assembly"],
         dimensions=model["dimensions"],
+        stated=model["stated"],
     )
 
 

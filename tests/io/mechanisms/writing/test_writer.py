@@ -9,7 +9,7 @@ import pytest
 
 import jounce as jn
 from jounce.constraints import AbstractConstraint, Vector
-from jounce.errors import MechanismError, MechanismFileError, OutputError
+from jounce.errors import MechanismError, MechanismFileError, OutputError, UnitError
 from jounce.io.files.dumping import dumped
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.writing.writer import mechanism_data
@@ -65,6 +65,23 @@ def test_values_of_a_law_of_its_own_take_the_place_of_their_names(tmp_path):
     jn.write_mechanism(mechanism, tmp_path / "bar.json")
     law = jn.load(tmp_path / "bar.json").drivers["turn"].motion
     assert law.text == "(2.0)*t + (-0.5)*sin(t)"
+
+
+@pytest.mark.parametrize("suffix", [".yaml", ".toml", ".json"])
+def test_a_parameter_keeps_its_unit(suffix, tmp_path):
+    """Such as that of time within a law, which no other entry of the file says."""
+    given = {"T": "500 ms", "rise": "30 deg", "bare": 0.1, "double": "2*T", "rate": "120 rpm", "M": "2 kNm/rad"}
+    mechanism = bar("rise*sin(2*pi*t/T) + bare*t", parameters=given).with_parameters(rate=3.0)
+    jn.write_mechanism(mechanism, tmp_path / f"bar{suffix}")
+    again = jn.load(tmp_path / f"bar{suffix}")
+    assert again.parameters == mechanism.parameters and (again.parameters["T"], again.parameters["rate"]) == (0.5, 3.0)
+    assert set(again.dimensions) == {"T", "rise", "rate", "M"}
+    jn.write_mechanism(again, tmp_path / f"twice{suffix}")
+    assert (tmp_path / f"twice{suffix}").read_text() == (tmp_path / f"bar{suffix}").read_text()
+    for name in ("T", "rise", "rate", "M"):
+        with pytest.raises(UnitError, match="this is a length, but the parameter is"):
+            again.with_parameters(**{name: "300 mm"})
+    assert again.with_parameters(bare="300 mm", T="3 min").parameters["T"] == 180.0
 
 
 def test_masses_and_instants(tmp_path):

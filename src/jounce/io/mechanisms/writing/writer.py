@@ -25,6 +25,7 @@ from jounce.mechanism.building.preconditions import concrete
 from jounce.mechanism.laws.cam_laws import leader_name
 from jounce.mechanism.outputs.derivative_outputs import form_of
 from jounce.settings import under_own_settings
+from jounce.units.dimensions import si_unit
 
 
 @under_own_settings
@@ -32,7 +33,8 @@ from jounce.settings import under_own_settings
 def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a mechanism to a YAML, TOML or JSON file that `load` reads.
 
-    Values are written in SI units, expressions unchanged. Splines through samples go to CSV files beside the file.
+    Values are written in SI units, expressions unchanged; parameters that were given with a unit have one. Splines
+    through samples go to CSV files beside the file.
 
     Parameters
     ----------
@@ -124,7 +126,7 @@ class _Writer:
         if mechanism.gravity is not None:
             data["gravity"] = plain(mechanism.gravity, "gravity")
         if mechanism.parameters:
-            data["parameters"] = {n: plain(x, f"parameters.{n}") for n, x in mechanism.parameters.items()}
+            data["parameters"] = {name: self._parameter(name, x) for name, x in mechanism.parameters.items()}
         data["bodies"] = {name: self._body(name, body) for name, body in mechanism.rigid_bodies.items()}
         if mechanism.assembly is not None:
             data["assembly"] = mechanism.assembly
@@ -139,6 +141,12 @@ class _Writer:
         if mechanism.time is not None:
             data["time"] = _time(mechanism.time)
         return data, self.laws.samples
+
+    def _parameter(self, name: str, value: Any) -> Any:
+        """Return the value of a parameter, with its unit if it was given with one."""
+        written = plain(value, f"parameters.{name}")
+        allowed = self.mechanism.dimensions.get(name, ()) if name in self.mechanism.stated else ()
+        return written if len(allowed) != 1 or isinstance(written, str) else f"{written!r} {si_unit(allowed[0])}"
 
     def _body(self, name: str, body: Body) -> dict[str, Any]:
         location = f"bodies.{name}"
