@@ -80,7 +80,7 @@ def test_joints_swing_within_their_limits():
     subject = robot_subject(robot)
     recording = subject.solve({p.name: p.value for p in subject.parameters}, 2)
     for name in robot.joint_names:
-        low, high, _, _ = swing_of(robot.joints[name])
+        low, high, _, _ = swing_of(robot.joints[name], robot.limits[name])
         values = recording.outputs[name].values[:, 0]
         assert low <= values.min() < values.max() <= high
         limit = robot.limits[name].velocity
@@ -95,6 +95,16 @@ def test_joints_swing_within_their_limits():
     drives = {e.name: e for e in recording.loads if e.kind == "driver"}
     torque = np.linalg.norm(drives["panda_joint2"].torque, axis=1)
     np.testing.assert_allclose(torque, np.abs(jn.inverse_dynamics(robot, _coordinates(recording, robot))[:, 0, 1]))
+
+
+def test_a_followed_joint_swings_within_the_range_of_its_followers():
+    wide, narrow = jn.Limits(lower=-1.0, upper=1.0), jn.Limits(lower=0.0, upper=0.2)
+    joints = [jn.Joint("a", "base", "left", "revolute", limits=wide)]
+    joints.append(jn.Joint("b", "base", "right", "revolute", limits=narrow, mimic=jn.robot.Mimic("a", -2.0)))
+    links = [jn.Link(name) for name in ("base", "left", "right")]
+    subject = robot_subject(jn.Robot("gripper", links, joints, strict=False))
+    follower = -2.0 * subject.solve({p.name: p.value for p in subject.parameters}, 0).outputs["a"].values[:, 0]
+    assert 0.0 <= follower.min() < follower.max() <= 0.2
 
 
 def _coordinates(recording, robot):

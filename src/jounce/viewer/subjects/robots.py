@@ -16,7 +16,7 @@ from jounce.errors import RobotError, SampleWarning, check_name
 from jounce.reporting.peaks import derivative_name
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.robot import forward_kinematics, inverse_dynamics, joint_wrenches
-from jounce.robot.model.links_and_joints import Joint
+from jounce.robot.model.links_and_joints import Joint, Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
 from jounce.units.shown_units import time_axes
@@ -175,9 +175,9 @@ def has_masses(robot: Robot) -> bool:
     return any(link.inertia is not None for link in robot.links.values())
 
 
-def swing_of(joint: Joint) -> tuple[float, float, float, float]:
-    """Return the limits of a joint, and the middle and amplitude of its swing, rad or m; about zero without limits."""
-    low, high, reach = joint.limits.lower, joint.limits.upper, REACH[joint.turning]
+def swing_of(joint: Joint, limits: Limits) -> tuple[float, float, float, float]:
+    """Return the range of a joint, and the middle and amplitude of its swing, rad or m; about zero without a range."""
+    low, high, reach = limits.lower, limits.upper, REACH[joint.turning]
     if low is None or high is None or not high > low:
         middle = low if low is not None and low == high else 0.0
         low, high = middle - 2 * reach, middle + 2 * reach
@@ -187,8 +187,9 @@ def swing_of(joint: Joint) -> tuple[float, float, float, float]:
 def swing_parameters(robot: Robot, names: tuple[str, ...], share: float) -> tuple[Parameter, ...]:
     """Return the parameters of swings: the period, and the amplitude, times a share, and middle of each joint."""
     swings, middles = [], []
+    limits = robot.limits  # with those of the joints that follow
     for joint in (robot.joints[name] for name in names):
-        low, high, middle, swing = swing_of(joint)
+        low, high, middle, swing = swing_of(joint, limits[joint.name])
         swings.append(Parameter(f"{joint.name} swing", share * swing, 0.0, 0.5 * (high - low), "Swings (rad or m)"))
         middles.append(Parameter(f"{joint.name} middle", middle, low, high, "Middles (rad or m)"))
     return (Parameter("period", _period(robot), 1.0, 20.0), *swings, *middles)
@@ -197,9 +198,9 @@ def swing_parameters(robot: Robot, names: tuple[str, ...], share: float) -> tupl
 def _period(robot: Robot) -> float:
     """Return a period at which all joints keep their limits of velocity."""
     slowest = SWING
-    for joint in (robot.joints[name] for name in robot.joint_names):
-        if joint.limits.velocity:
-            slowest = max(slowest, 2 * np.pi * swing_of(joint)[3] / joint.limits.velocity)
+    for name, limits in robot.limits.items():
+        if limits.velocity:
+            slowest = max(slowest, 2 * np.pi * swing_of(robot.joints[name], limits)[3] / limits.velocity)
     return float(np.ceil(slowest))
 
 
