@@ -114,14 +114,14 @@ def from_denavit_hartenberg(
         for field in ("a", "alpha", "d", "theta"):
             finite_numbers(f"row {k}.{field}", getattr(row, field), ())
         parent, about_z, about_x = links[-1].name, turn_about(Z, row.theta), turn_about(X, row.alpha)
-        moved = {"type": row.type, "limits": row.limits}
+        options = {"type": row.type, "limits": row.limits}
         if convention == "modified":
             transform = about_x @ (row.a * X + row.d * Z)
             joints.append(
-                Joint(f"joint_{k}", parent, f"link_{k}", position=transform, rotation=about_x @ about_z, **moved)
+                Joint(f"joint_{k}", parent, f"link_{k}", position=transform, rotation=about_x @ about_z, **options)
             )
         else:  # the joint axis does not pass through the origin of the link frame: add a frame on the axis in between
-            joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", **moved))
+            joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", **options))
             links.append(Link(f"axis_{k}"))
             transform = about_z @ (row.a * X) + row.d * Z
             joints.append(Joint(f"fixed_{k}", f"axis_{k}", f"link_{k}", "fixed", transform, about_z @ about_x))
@@ -166,8 +166,8 @@ def from_screws(screws: Sequence[JointAxis], tool: ArrayLike | None = None, name
     links, joints, parent = [Link("base")], [], "base"
     for k, screw in enumerate(screws, 1):
         point = vector_numbers(f"screw {k}.point", screw.point, (3,))
-        moved = {"type": screw.type, "axis": screw.axis, "limits": screw.limits}
-        joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", position=point, **moved))
+        options = {"type": screw.type, "axis": screw.axis, "limits": screw.limits}
+        joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", position=point, **options))
         joints.append(Joint(f"fixed_{k}", f"axis_{k}", f"link_{k}", "fixed", position=-point))
         links += [Link(f"axis_{k}"), Link(f"link_{k}", screw.inertia)]
         parent = f"link_{k}"

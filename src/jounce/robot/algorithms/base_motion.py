@@ -60,7 +60,7 @@ def base_arrays(base: BaseMotion, lead: tuple[int, ...], levels: int) -> tuple[A
     """
     if not isinstance(base, BaseMotion):
         raise RobotError("must be a jn.robot.BaseMotion", name="base", value=type(base).__name__)
-    parts = []
+    arrays = []
     for name, shape in (("position", (3,)), ("quaternion", (4,)), ("twist", (levels, 6))):
         array = floats(f"base.{name}", by_component(f"base.{name}", getattr(base, name), RobotError))
         if name == "twist" and array.ndim == len(lead) + 2 and array.shape[-2] > levels:
@@ -68,12 +68,12 @@ def base_arrays(base: BaseMotion, lead: tuple[int, ...], levels: int) -> tuple[A
         if array.shape != (*lead, *shape):
             message = f"must have the shape {(*lead, *shape)}, as the coordinates have, not {array.shape}"
             raise RobotError(message, name=f"base.{name}")
-        parts.append(array)
-    position, quaternion, twist = parts
-    library = jnp if any(isinstance(x, jax.Array) for x in parts) else np
+        arrays.append(array)
+    position, quaternion, twist = arrays
+    library = jnp if any(isinstance(x, jax.Array) for x in arrays) else np
     length = library.sqrt(library.sum(quaternion * quaternion, axis=-1, keepdims=True))
-    if not isinstance(length, Tracer) and (far := np.abs(np.asarray(length) - 1)).size and far.max() > UNIT:
-        value = float(np.ravel(length)[far.argmax()])
+    if not isinstance(length, Tracer) and (errors := np.abs(np.asarray(length) - 1)).size and errors.max() > UNIT:
+        value = float(np.ravel(length)[errors.argmax()])
         raise RobotError("must be of unit length, scalar first; its length is", name="base.quaternion", value=value)
     return library.concatenate([position, quaternion / length], axis=-1)[..., None, :], twist
 
@@ -92,20 +92,20 @@ def scene_axes(quaternion: Float[Numbers, "4 batch"], twist: TwistSeries) -> tup
     for i in range(3):
         axis = Jet([jnp.stack([column[i] for column in axes])])
         for k in range(len(twist)):
-            turned = cross(axis, Jet(tuple(twist[: k + 1, 3:])))
-            axis = axis.append(turned.dense().coefficients[k] / (k + 1))
+            rate = cross(axis, Jet(tuple(twist[: k + 1, 3:])))
+            axis = axis.append(rate.dense().coefficients[k] / (k + 1))
         coefficients.append(axis)
     return coefficients[0], coefficients[1], coefficients[2]
 
 
 def in_base(axes: tuple[Jet, Jet, Jet], vector: Jet | Numbers) -> Jet:
     """Return a vector in the axes of the base from its components in the axes of the scene."""
-    parts = [vector[i : i + 1] for i in range(3)]
-    rotated = axes[0] * parts[0] + axes[1] * parts[1] + axes[2] * parts[2]
+    components_ = [vector[i : i + 1] for i in range(3)]
+    rotated = axes[0] * components_[0] + axes[1] * components_[1] + axes[2] * components_[2]
     return rotated.dense()
 
 
 def free_fall_velocity(axes: tuple[Jet, Jet, Jet], gravity: Numbers, levels: int) -> Float[Numbers, "level 3 batch"]:
     """Return the velocity, zero now, of a base that accelerates against gravity, in base axes, (levels, 3, batch)."""
-    against = stacked(in_base(axes, -jnp.asarray(gravity)[:, None]))[: levels - 1]
-    return jnp.concatenate([jnp.zeros_like(against[:1]), against])
+    fall = stacked(in_base(axes, -jnp.asarray(gravity)[:, None]))[: levels - 1]
+    return jnp.concatenate([jnp.zeros_like(fall[:1]), fall])

@@ -152,14 +152,14 @@ class LoadedRobot:
     """
 
     def __init__(self, robot: Robot, loads: Sequence[CarriedLoad], start: float, stop: float):
-        self.loads, near, moved = tuple(loads), SAME * (stop - start), f"the motion runs from {start:g} to {stop:g}"
+        self.loads, near, span = tuple(loads), SAME * (stop - start), f"the motion runs from {start:g} to {stop:g}"
         self.near = near
         intervals = []
         for load in self.loads:
             first, last = (start if load.start is None else load.start), (stop if load.stop is None else load.stop)
             if first < start - near or last > stop + near or last - first <= near:
-                what = "is taken up or set down outside of the motion" if last > first else "is not carried at all"
-                raise TrajectoryError(f"{what}: {moved}", name=f"loads.{load.link}", value=[first, last])
+                phrase = "is taken up or set down outside of the motion" if last > first else "is not carried at all"
+                raise TrajectoryError(f"{phrase}: {span}", name=f"loads.{load.link}", value=[first, last])
             intervals.append((first, last))
         edges = np.unique(np.array(intervals).reshape(-1))
         edges = edges[(edges > start + near) & (edges < stop - near)]
@@ -169,9 +169,9 @@ class LoadedRobot:
             for a, b in itertools.pairwise([start, *self.changes.tolist(), stop])
         )
 
-    def _carrying(self, robot: Robot, intervals: list[tuple[float, float]], at: float) -> Robot:
+    def _carrying(self, robot: Robot, intervals: list[tuple[float, float]], time: float) -> Robot:
         for load, (first, last) in zip(self.loads, intervals, strict=True):
-            if first < at < last:
+            if first < time < last:
                 robot = robot.with_payload(load.link, load.inertia)
             else:
                 check_name("link", load.link, robot.links, TrajectoryError, name="loads")
@@ -183,23 +183,25 @@ class LoadedRobot:
         """Return the torques for coordinates at places of the motion; at a load change, the torques after it."""
         if len(self.robots) == 1:
             return np.asarray(inverse_dynamics(self.robots[0], q, drives=drives))
-        which = np.searchsorted(self.changes, at, side="right")
+        robot_index = np.searchsorted(self.changes, at, side="right")
         torques = np.zeros((*q.shape[:-2], q.shape[-2] - 2, q.shape[-1]))
-        for k in np.unique(which):
-            own = which == k
-            torques[..., own, :, :] = inverse_dynamics(self.robots[k], q[..., own, :, :], drives=drives)
+        for k in np.unique(robot_index):
+            is_carrying = robot_index == k
+            torques[..., is_carrying, :, :] = inverse_dynamics(self.robots[k], q[..., is_carrying, :, :], drives=drives)
         return torques
 
     def at_changes(self, q: Float[np.ndarray, "change derivative joint"], drives: bool) -> tuple[LoadChange, ...]:
         """Return the effect of each load change, for the coordinates at the changes."""
-        return tuple(self._change(k, own[None, :3], drives) for k, own in enumerate(q))
+        return tuple(self._change(k, sample[None, :3], drives) for k, sample in enumerate(q))
 
     def _change(self, k: int, q: Float[np.ndarray, "1 3 joint"], drives: bool) -> LoadChange:
         before, after = self.robots[k : k + 2]
-        early, late = (np.asarray(inverse_dynamics(own, q, drives=drives))[0, 0] for own in (before, after))
-        least = NO_STEP * max(float(np.abs([early, late]).max()), np.finfo(float).tiny)
+        early, late = (np.asarray(inverse_dynamics(robot, q, drives=drives))[0, 0] for robot in (before, after))
+        threshold = NO_STEP * max(float(np.abs([early, late]).max()), np.finfo(float).tiny)
         steps = {
-            name: float(x) for name, x in zip(before.joint_names, late - early, strict=True) if abs(float(x)) > least
+            name: float(x)
+            for name, x in zip(before.joint_names, late - early, strict=True)
+            if abs(float(x)) > threshold
         }
         time, masses, speed = float(self.changes[k]), dict[str, float](), 0.0
         for load in self.loads:

@@ -40,12 +40,12 @@ def times_inertia(tree: Tree, frames: Frames, vector: Jet) -> Jet:
 
     The shape is (3, ..., bodies, batch).
     """
-    between = (1,) * (len(vector.shape) - 3)
-    frames = jax.tree.map(lambda c: jnp.reshape(c, (3, *between, *c.shape[1:])), frames)
+    inserted_axes = (1,) * (len(vector.shape) - 3)
+    frames = jax.tree.map(lambda c: jnp.reshape(c, (3, *inserted_axes, *c.shape[1:])), frames)
     tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)
-    tensor = jnp.reshape(tensor, (3, 3, *between, tensor.shape[-1], 1))
+    tensor = jnp.reshape(tensor, (3, 3, *inserted_axes, tensor.shape[-1], 1))
     local = components(frames.to_body(vector))
-    return frames.direction(total(tensor[:, i] * part for i, part in enumerate(local)))
+    return frames.direction(total(tensor[:, i] * component for i, component in enumerate(local)))
 
 
 def partial_velocities(tree: Tree, frames: Frames) -> tuple[Jet, Jet]:
@@ -56,9 +56,9 @@ def partial_velocities(tree: Tree, frames: Frames) -> tuple[Jet, Jet]:
     axis, origin = (jet.map(lambda c: c[:, :, None]) for jet in (frames.axes[2], frames.position))
     center = centers_of(tree, frames).map(lambda c: c[:, None])
     turning = jnp.asarray(tree.turning)[:, None, None]
-    moved = jnp.swapaxes(jnp.asarray(tree.ancestors)[:-1], 0, 1)[:, :, None]
+    is_moved = jnp.swapaxes(jnp.asarray(tree.ancestors)[:-1], 0, 1)[:, :, None]
     linear = cross(axis, center - origin) * turning + axis * (1 - turning)
-    return linear * moved, axis * (turning * moved)
+    return linear * is_moved, axis * (turning * is_moved)
 
 
 def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> BodySeries:
@@ -66,8 +66,8 @@ def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> Bod
 
     Forces at the centers of mass, and moments, have the shape (3, bodies, batch), in the axes of the base.
     """
-    done = [dot(p, f.map(lambda c: c[:, None])) for p, f in zip(partial, (force, moment), strict=True) if f is not None]
-    return stacked(total(done).map(lambda c: jnp.sum(c, axis=1)))
+    dots = [dot(p, f.map(lambda c: c[:, None])) for p, f in zip(partial, (force, moment), strict=True) if f is not None]
+    return stacked(total(dots).map(lambda c: jnp.sum(c, axis=1)))
 
 
 def work_of_weight(tree: Tree, frames: Frames) -> BodySeries:
@@ -78,10 +78,10 @@ def work_of_weight(tree: Tree, frames: Frames) -> BodySeries:
     if not tree.shape.lifted:
         return work(partial, Jet.constant(-weight, order))
     lift, moment = jnp.asarray(tree.lift)[:-1], jnp.asarray(tree.lift_moment)[:-1]
-    down = jnp.broadcast_to(jnp.asarray(tree.gravity)[:, None, None], weight.shape)
-    off = moment - lift[:, None] * jnp.asarray(tree.center)  # moment of the lifted mass about the center of mass
-    arm = frames.direction(jnp.swapaxes(off, 0, 1)[:, :, None])
-    return work(partial, Jet.constant(lift[None, :, None] * down - weight, order), cross(arm, down))
+    gravity = jnp.broadcast_to(jnp.asarray(tree.gravity)[:, None, None], weight.shape)
+    excess = moment - lift[:, None] * jnp.asarray(tree.center)  # moment of the lifted mass about the center of mass
+    arm = frames.direction(jnp.swapaxes(excess, 0, 1)[:, :, None])
+    return work(partial, Jet.constant(lift[None, :, None] * gravity - weight, order), cross(arm, gravity))
 
 
 def work_of_motion(tree: Tree, q: Series, frames: Frames) -> Float[Numbers, "order-1 body batch"]:
@@ -91,11 +91,11 @@ def work_of_motion(tree: Tree, q: Series, frames: Frames) -> Float[Numbers, "ord
     """
     partial = partial_velocities(tree, frames)
     rate = Jet(tuple(joint_coordinates(tree, q)[:, :, None])).differentiate()
-    left = [(p.differentiate() * rate).map(lambda c: jnp.sum(c, axis=1)) for p in partial]
+    remainders = [(p.differentiate() * rate).map(lambda c: jnp.sum(c, axis=1)) for p in partial]
     spin = frames.angular_velocity
     assert spin is not None  # there are velocities
-    moment = times_inertia(tree, frames, left[1]) + cross(spin, times_inertia(tree, frames, spin))
-    return work(partial, left[0] * jnp.asarray(tree.mass)[:, None], moment)
+    moment = times_inertia(tree, frames, remainders[1]) + cross(spin, times_inertia(tree, frames, spin))
+    return work(partial, remainders[0] * jnp.asarray(tree.mass)[:, None], moment)
 
 
 def mass_jet(tree: Tree, q: Series) -> Float[jax.Array, "order coordinate coordinate batch"]:
@@ -109,14 +109,16 @@ def mass_jet(tree: Tree, q: Series) -> Float[jax.Array, "order coordinate coordi
     axis, origin = frames.axes[2], frames.position
     momentum = linear * jnp.asarray(tree.mass)[:, None]
     arm = centers_of(tree, frames).map(lambda c: c[:, None]) - origin.map(lambda c: c[:, :, None])
-    about = times_inertia(tree, frames, angular) + cross(arm, momentum)
-    momentum, about = (jet.map(lambda c: jnp.sum(c, axis=2)[:, None]) for jet in (momentum, about))
+    angular_momentum = times_inertia(tree, frames, angular) + cross(arm, momentum)
+    momentum, angular_momentum = (
+        jet.map(lambda c: jnp.sum(c, axis=2)[:, None]) for jet in (momentum, angular_momentum)
+    )
     nearer, from_nearer = (jet.map(lambda c: c[:, :, None]) for jet in (axis, origin))
     turning = jnp.asarray(tree.turning)[:, None, None]
     lever = origin.map(lambda c: c[:, None]) - from_nearer
-    moment = (about + cross(lever, momentum)) * turning
-    moves = jnp.swapaxes(jnp.asarray(tree.ancestors)[:-1], 0, 1)[:, :, None]
-    half = stacked(dot(nearer, moment + momentum * (1 - turning)) * moves)
+    moment = (angular_momentum + cross(lever, momentum)) * turning
+    is_moved = jnp.swapaxes(jnp.asarray(tree.ancestors)[:-1], 0, 1)[:, :, None]
+    half = stacked(dot(nearer, moment + momentum * (1 - turning)) * is_moved)
     matrix = half + jnp.swapaxes(half, 1, 2) * (1 - np.eye(tree.shape.bodies))[None, :, :, None]
     if tree.shape.direct:
         return matrix
@@ -172,8 +174,8 @@ def _bias(tree: Tree, arrays: tuple[Series], _: Any, parts: frozenset[str], driv
     forces = forces + stacked(passive_forces(tree, coordinates, rate, levels - 1))
     if not tree.shape.armed:
         return forces
-    still = Jet.constant(jnp.zeros(q.shape[1:]), levels - 1)  # constant rates of a ball still accelerate its drive
-    return forces + stacked(inertial_forces(tree, coordinates, rate, still))
+    zeros = Jet.constant(jnp.zeros(q.shape[1:]), levels - 1)  # constant rates of a ball still accelerate its drive
+    return forces + stacked(inertial_forces(tree, coordinates, rate, zeros))
 
 
 @stacked_arguments(2, "jn.mass_matrix(robot, q) for pin.crba(model, data, q)")

@@ -143,8 +143,8 @@ def forward_dynamics(
         mask[robot.joint_names.index(name)] = 1.0
     pushes = wrench_arrays(robot, wrenches, lead, levels, time, free=base is not None)
     frames = tuple(frame_at(robot, wrench.link, wrench.point) for wrench in wrenches)
-    moved = () if base is None else (*base_arrays(base, lead, 1), at_base)
-    arrays = (state, forces, *moved, *pushes)
+    base_values = () if base is None else (*base_arrays(base, lead, 1), at_base)
+    arrays = (state, forces, *base_values, *pushes)
     constants = (mask, frames, None if base is None else base_body(robot))
     traced = is_traced((arrays, robot.tree, constants))
     static = (tuple(wrench.frame == "base" for wrench in wrenches), drives, traced)
@@ -185,30 +185,30 @@ def _forward_dynamics(
 
     if levels == 1 or lanes % WIDE or lanes == WIDE:
         return coefficients_of(arrays)
-    parts = tuple(jnp.moveaxis(x.reshape(*x.shape[:-1], lanes // WIDE, WIDE), -2, 0) for x in arrays)
-    whole = jax.lax.map(coefficients_of, parts)
-    return jax.tree.map(lambda x: jnp.moveaxis(x, 0, -2).reshape(*x.shape[1:-1], lanes), whole)
+    wide_batches = tuple(jnp.moveaxis(x.reshape(*x.shape[:-1], lanes // WIDE, WIDE), -2, 0) for x in arrays)
+    results = jax.lax.map(coefficients_of, wide_batches)
+    return jax.tree.map(lambda x: jnp.moveaxis(x, 0, -2).reshape(*x.shape[1:-1], lanes), results)
 
 
 def _coefficients(equations: TreeEquations, arrays: tuple[Any, ...], reversible: bool) -> Any:
-    state, forces, *rest = arrays
-    free = equations.base is not None
-    base = free_base(rest[0][0, :3], rest[0][0, 3:], rest[1][0]) if free else None
-    at_base, pushes = (rest[2], tuple(rest[3:])) if free else (None, tuple(rest))
+    state, forces, *extras = arrays
+    has_base = equations.base is not None
+    base = free_base(extras[0][0, :3], extras[0][0, 3:], extras[1][0]) if has_base else None
+    at_base, pushes = (extras[2], tuple(extras[3:])) if has_base else (None, tuple(extras))
     mask = jnp.asarray(equations.driven)[None, :, None]
     driven = mask * forces
 
-    def applied(_: Any, given: Any) -> Any:
-        forces, at_base, pushes = given
+    def applied(_: Any, inputs: Any) -> Any:
+        forces, at_base, pushes = inputs
         return Unknowns(forces, at_base), pushes
 
     order = len(forces) - 1
     # forces of driven joints follow from their accelerations: they have no force residual
-    given = ((1.0 - mask) * forces, at_base, pushes)
+    inputs = ((1.0 - mask) * forces, at_base, pushes)
     # only the program of one sample is unrolled, as it becomes machine code; unrolled long histories would be too long
-    single = state.shape[-1] == 1 and not reversible and len(forces) <= MOST_UNROLLED
+    unrolled = state.shape[-1] == 1 and not reversible and len(forces) <= MOST_UNROLLED
     motion = equations.motion(state[0], state[1], base)
-    series = motion_series(equations, motion, applied, given, driven, order, reversible=reversible, unrolled=single)
+    series = motion_series(equations, motion, applied, inputs, driven, order, reversible=reversible, unrolled=unrolled)
     q, margin = coordinates_of(series, order), series.factor.margin[None]
     rates = series.accelerations.base
     if series.twist is None or rates is None:
@@ -218,29 +218,29 @@ def _coefficients(equations: TreeEquations, arrays: tuple[Any, ...], reversible:
 
 def coordinates_of(series: MotionSeries, order: int) -> Float[Numbers, "level coordinate batch"]:
     """Return the coefficients of the coordinates, two levels more than those of the accelerations."""
-    last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
-    return jnp.concatenate([series.coordinates[: order + 2], last])
+    top_levels = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
+    return jnp.concatenate([series.coordinates[: order + 2], top_levels])
 
 
 def _check_margins(robot: Robot, margin: Any, driven: np.ndarray) -> None:
     """Raise SingularityError, naming the joint, if a free joint moves no inertia."""
     margin = np.reshape(margin, (math.prod(margin.shape[:-1]), margin.shape[-1]))  # a lone body has no joints
-    free = np.ones(margin.shape[1])
+    is_free = np.ones(margin.shape[1])
     by_joint = robot.tree.shape.direct and not robot.tree.shape.armed
     if by_joint:
-        free[: len(driven)] = 1.0 - driven
-    bad = ~(margin > LEAST_INERTIA) & (free > 0)
-    if not bad.any():
+        is_free[: len(driven)] = 1.0 - driven
+    is_undetermined = ~(margin > LEAST_INERTIA) & (is_free > 0)
+    if not is_undetermined.any():
         return
-    sample = int(np.argwhere(bad)[0, 0])
-    where = f" at sample {sample}" if len(margin) > 1 else ""
+    sample = int(np.argwhere(is_undetermined)[0, 0])
+    at_sample = f" at sample {sample}" if len(margin) > 1 else ""
     names = [joint.name for joint in robot.moving_joints] if by_joint else []
-    joints = np.flatnonzero(bad[sample, : len(names)])
+    joints = np.flatnonzero(is_undetermined[sample, : len(names)])
     if not joints.size:
-        message = f"some motion of the joints or of the free base has no inertia{where}: it has no acceleration"
+        message = f"some motion of the joints or of the free base has no inertia{at_sample}: it has no acceleration"
         raise SingularityError(f"{message}; give the links and the base inertias", name=robot.name)
     message = (
-        f"the bodies that this joint moves have no inertia about its axis{where}, so that its acceleration is not "
+        f"the bodies that this joint moves have no inertia about its axis{at_sample}, so that its acceleration is not "
         "determined; give the link an inertia, or the joint an armature, or drive it"
     )
     # name the outermost joint: the accelerations of the joints that carry it are undetermined as well

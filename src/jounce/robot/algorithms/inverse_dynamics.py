@@ -89,8 +89,8 @@ def inverse_dynamics(
     arrays, static = _applied(robot, q, wrenches, time, free=base is not None)
     if base is None:
         return generalized_forces(robot, arrays[0], arrays[1], (*static, drives))
-    moved = base_arrays(base, q.shape[:-2], q.shape[-2] - 1)
-    return _forces_of_free_tree(robot, (*arrays[0], *moved), (arrays[1], base_body(robot)), (*static, drives))
+    base_values = base_arrays(base, q.shape[:-2], q.shape[-2] - 1)
+    return _forces_of_free_tree(robot, (*arrays[0], *base_values), (arrays[1], base_body(robot)), (*static, drives))
 
 
 def joint_wrenches(
@@ -140,10 +140,10 @@ def joint_wrenches(
     if fixed:
         robot, q = _with_held_joints(robot, q, fixed)
     arrays, static = _applied(robot, q, wrenches, time)
-    turned = [robot.frames[link].rotation for link in robot.moving_links]
-    aligned = np.moveaxis(np.array(turned).reshape(-1, 3, 3), 0, -1)
-    of_bodies = _joint_wrenches(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
-    return of_bodies[..., [robot.moving_links.index(link) for link in links], :] if fixed else of_bodies
+    rotations = [robot.frames[link].rotation for link in robot.moving_links]
+    aligned = np.moveaxis(np.array(rotations).reshape(-1, 3, 3), 0, -1)
+    body_wrenches = _joint_wrenches(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
+    return body_wrenches[..., [robot.moving_links.index(link) for link in links], :] if fixed else body_wrenches
 
 
 def _checked_fixed(robot: Robot, names: Sequence[str]) -> Sequence[str]:
@@ -164,22 +164,22 @@ def _with_held_joints(robot: Robot, q: Any, names: Sequence[str]) -> tuple[Robot
         dataclasses.replace(joint, type="continuous", axis=(0, 0, 1)) if name in names else joint
         for name, joint in robot.joints.items()
     ]
-    held = robot.changed(joints=joints, strict=False)  # a fixed link may be a frame without mass
+    released = robot.changed(joints=joints, strict=False)  # a fixed link may be a frame without mass
     column = {name: k for k, name in enumerate(robot.joint_names)}
     library = jnp if is_traced(q) else np
     wider = library.concatenate(
         [q, library.zeros((*q.shape[:-1], 1))], axis=-1
     )  # the last column is that of all held joints
-    return held, wider[..., [column.get(name, len(column)) for name in held.joint_names]]
+    return released, wider[..., [column.get(name, len(column)) for name in released.joint_names]]
 
 
 def _applied(
     robot: Robot, q: Any, wrenches: Sequence[Wrench], time: ArrayLike | None, *, free: bool = False
 ) -> tuple[Any, Any]:
     """Return the arrays, the constants and the static arguments of a program with wrenches."""
-    given = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time, free=free)
+    values = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time, free=free)
     frames = tuple(frame_at(robot, wrench.link, wrench.point) for wrench in wrenches)
-    return ((q, *given), frames), (tuple(wrench.frame == "base" for wrench in wrenches),)
+    return ((q, *values), frames), (tuple(wrench.frame == "base" for wrench in wrenches),)
 
 
 def _on_bodies(
@@ -200,15 +200,15 @@ def _on_bodies(
         return None
     levels = q.shape[0] - 2
     frames: Any = body_frames(tree, q[:levels]) if any(global_axes) or lifted else None
-    whole = jnp.zeros((levels, tree.shape.bodies + 1, 6, q.shape[-1]))
+    loads = jnp.zeros((levels, tree.shape.bodies + 1, 6, q.shape[-1]))
     if lifted:
-        down = jnp.asarray(tree.gravity)[:, None]
-        fall = Jet.constant(down, levels - 1) if scene is None else in_base(scene, down).truncate(levels - 1)
+        gravity = jnp.asarray(tree.gravity)[:, None]
+        fall = Jet.constant(gravity, levels - 1) if scene is None else in_base(scene, gravity).truncate(levels - 1)
         local = frames.to_body(fall.map(lambda c: c[:, None]))
         force = local * (-jnp.asarray(tree.lift))[:, None]
         moment = cross(local, jnp.swapaxes(jnp.asarray(tree.lift_moment), 0, 1)[:, :, None])
         lifts = stacked(concatenate([force, moment]))  # levels, components, bodies, batch
-        whole = whole + jnp.swapaxes(jnp.broadcast_to(lifts, (*lifts.shape[:-1], q.shape[-1])), 1, 2)
+        loads = loads + jnp.swapaxes(jnp.broadcast_to(lifts, (*lifts.shape[:-1], q.shape[-1])), 1, 2)
     for values, (body, point, rotation), in_scene in zip(wrenches, link_frames, global_axes, strict=True):
         force, torque = Jet(tuple(values[:, :3])), Jet(tuple(values[:, 3:]))
         if in_scene:
@@ -219,8 +219,8 @@ def _on_bodies(
         else:
             force, torque = (matvec(rotation[:, :, None], part) for part in (force, torque))
         moment = torque + cross(point[:, None], force)
-        whole = whole + of_one_body(stacked(concatenate([force, moment])), body, tree.shape.bodies + 1)
-    return whole
+        loads = loads + of_one_body(stacked(concatenate([force, moment])), body, tree.shape.bodies + 1)
+    return loads
 
 
 @Batched
@@ -239,8 +239,8 @@ def _of_drives(tree: Tree, q: Any) -> Any:
     coordinates = Jet(tuple(q))
     rate = coordinates.differentiate()
     acceleration = rate.differentiate()
-    needed = inertial_forces(tree, coordinates, rate, acceleration)
-    return stacked(needed + passive_forces(tree, coordinates, rate, acceleration.order))
+    inertial = inertial_forces(tree, coordinates, rate, acceleration)
+    return stacked(inertial + passive_forces(tree, coordinates, rate, acceleration.order))
 
 
 @Batched
@@ -251,13 +251,13 @@ def _forces_of_free_tree(
     frames, body = constants
     scene = scene_axes(pose[0, 3:], twist)
     applied = _on_bodies(tree, (q, *wrenches), frames, global_axes, scene)
-    moving = twist[:, 3:], twist[:, :3] + free_fall_velocity(scene, tree.gravity, len(twist))
+    base_velocity = twist[:, 3:], twist[:, :3] + free_fall_velocity(scene, tree.gravity, len(twist))
     on_bodies = None if applied is None else applied[:, :-1]
-    along, _, _, transmitted = recursive_newton_euler(tree, q, on_bodies, moving)
-    forces = to_coordinates(tree, along)
-    w, v = (Jet(tuple(x)) for x in moving)
-    own = inertial_wrench(jnp.asarray(body.mass), jnp.asarray(body.center), jnp.asarray(body.inertia), w, v)
-    at_base = jnp.concatenate([stacked(a) + b for a, b in zip(own, transmitted, strict=True)], axis=1)
+    joint_forces, _, _, transmitted = recursive_newton_euler(tree, q, on_bodies, base_velocity)
+    forces = to_coordinates(tree, joint_forces)
+    w, v = (Jet(tuple(x)) for x in base_velocity)
+    of_base = inertial_wrench(jnp.asarray(body.mass), jnp.asarray(body.center), jnp.asarray(body.inertia), w, v)
+    at_base = jnp.concatenate([stacked(a) + b for a, b in zip(of_base, transmitted, strict=True)], axis=1)
     at_base = at_base if applied is None else at_base - applied[:, -1]
     return jnp.concatenate([at_base, forces + _of_drives(tree, q) if drives else forces], axis=1)
 
@@ -271,10 +271,10 @@ def _joint_wrenches(
     applied = _on_bodies(tree, arrays, link_frames, global_axes)
     applied = None if applied is None else applied[:, :-1]
     _, force, moment, _ = recursive_newton_euler(tree, q, applied)
-    parts = [Jet(tuple(jnp.swapaxes(x, 1, 2))) for x in (force, moment)]  # components, bodies, batch
+    vectors = [Jet(tuple(jnp.swapaxes(x, 1, 2))) for x in (force, moment)]  # components, bodies, batch
     if in_base:
         frames = body_frames(tree, q[:-2])
-        rotated = [frames.without_base().direction(part) for part in parts]
+        rotated = [frames.without_base().direction(vector) for vector in vectors]
     else:
-        rotated = [part.map(lambda c: jnp.einsum("ijb,ibs->jbs", aligned, c)) for part in parts]
+        rotated = [vector.map(lambda c: jnp.einsum("ijb,ibs->jbs", aligned, c)) for vector in vectors]
     return jnp.swapaxes(stacked(concatenate(rotated)), 1, 2)

@@ -24,9 +24,9 @@ def jacobian_jet(tree: Tree, q: Series, frame: Frame) -> Jet:
     bodies = frames.without_base()
     axis = bodies.axes[2]
     turning = jnp.asarray(tree.turning)[:, None]
-    moved = jnp.asarray(tree.ancestors)[frame.body][:, None]
+    is_moved = jnp.asarray(tree.ancestors)[frame.body][:, None]
     linear = cross(axis, target - bodies.position) * turning + axis * (1 - turning)
-    columns = concatenate([linear, axis * turning]) * moved
+    columns = concatenate([linear, axis * turning]) * is_moved
     return columns.map(lambda c: to_coordinates(tree, c))
 
 

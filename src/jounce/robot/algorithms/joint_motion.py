@@ -64,17 +64,17 @@ def _solved(
 
     u, s, v = singular_values(jacobian_jet(tree, position, frame).coefficients[0][rows_])
     limit = threshold * s[:1]
-    near = s <= limit  # also where all are zero, and no motion is possible
-    squares = jnp.where(near, damping**2 * (1 - (s / jnp.where(limit == 0, 1.0, limit)) ** 2), 0.0)
-    inverse = jnp.where(near & (damping == 0), jnp.nan, s / jnp.where(squares + s == 0, 1.0, s**2 + squares))
+    is_singular = s <= limit  # also where all are zero, and no motion is possible
+    squares = jnp.where(is_singular, damping**2 * (1 - (s / jnp.where(limit == 0, 1.0, limit)) ** 2), 0.0)
+    inverse = jnp.where(is_singular & (damping == 0), jnp.nan, s / jnp.where(squares + s == 0, 1.0, s**2 + squares))
     pseudo = jnp.sum(v[:, None] * (u * inverse[None])[None], axis=2)
     q = position
     for k in range(target.shape[0]):
         trial = jnp.concatenate([q, jnp.zeros_like(position)])
-        missing = target[k] - task_twist(trial)[k]
-        q = jnp.concatenate([q, jnp.sum(pseudo * missing[None], axis=1)[None] / (k + 1)])
+        deficit = target[k] - task_twist(trial)[k]
+        q = jnp.concatenate([q, jnp.sum(pseudo * deficit[None], axis=1)[None] / (k + 1)])
     residual = target - task_twist(q)
-    return q, s[None], near.any(axis=0).astype(float)[None, None], residual
+    return q, s[None], is_singular.any(axis=0).astype(float)[None, None], residual
 
 
 def joint_motion(
@@ -138,9 +138,9 @@ def joint_motion(
     [[0.0], [2.0], [0.0]]
     """
     rows = _rows(task)
-    for name, value, least in (("damping", damping, 0.0), ("threshold", threshold, 1e-15)):
-        if finite_numbers(name, value, ()) < least:
-            raise RobotError(f"must be {least:g} or greater", name=name, value=value)
+    for name, value, lower_bound in (("damping", damping, 0.0), ("threshold", threshold, 1e-15)):
+        if finite_numbers(name, value, ()) < lower_bound:
+            raise RobotError(f"must be {lower_bound:g} or greater", name=name, value=value)
     start, target = checked_position(robot, position, "position"), floats("operational", operational)
     lead = start.shape[:-2]
     if target.ndim < 2 or target.shape[:-2] != lead or target.shape[-1] not in (6, len(rows)) or target.shape[-2] < 1:
@@ -152,11 +152,11 @@ def joint_motion(
     q, values, singular, residual = _solved(robot, (start, target), constants, (rows,))
     values, singular = values[..., 0, :], singular[..., 0, 0] > 0
     if strict and damping == 0 and not isinstance(singular, Tracer) and np.any(singular):
-        first = tuple(int(i) for i in np.argwhere(np.atleast_1d(singular))[0])
-        smallest, largest = (float(values[first if lead else ()][k]) for k in (-1, 0))
-        where = "" if not lead else f" at sample {first[0] if len(first) == 1 else first}"
+        sample = tuple(int(i) for i in np.argwhere(np.atleast_1d(singular))[0])
+        smallest, largest = (float(values[sample if lead else ()][k]) for k in (-1, 0))
+        sample_text = "" if not lead else f" at sample {sample[0] if len(sample) == 1 else sample}"
         message = (
-            f"the configuration is singular for this task{where}: the singular values of the Jacobian reach from "
+            f"the configuration is singular for this task{sample_text}: the singular values of the Jacobian reach from "
             f"{largest:.2g} down to {smallest:.2g}; give a damping, or take another task or path"
         )
         raise SingularityError(message, name=link)
@@ -169,7 +169,7 @@ def _rows(task: str | Sequence[int]) -> tuple[int, ...]:
         check_choice("task", task, TASKS, RobotError)
         return TASKS[task]
     rows = tuple(task)
-    whole = all(isinstance(row, int | np.integer) and 0 <= row <= 5 for row in rows)
-    if not whole or not rows or len(set(rows)) < len(rows):
+    are_valid = all(isinstance(row, int | np.integer) and 0 <= row <= 5 for row in rows)
+    if not are_valid or not rows or len(set(rows)) < len(rows):
         raise RobotError("must be a name or different rows from 0 to 5", name="task", value=list(rows))
     return tuple(int(row) for row in rows)

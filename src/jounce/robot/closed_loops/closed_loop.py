@@ -104,8 +104,8 @@ def mechanism(
         time = getattr(drivers, "times", None)
     laws = {"drivers": getattr(drivers, "laws", drivers) or {}, "initial": initial or {}}
     driven = {name: law for kind in laws.values() for name, law in kind.items()}
-    for kind, given in laws.items():
-        for name in given:
+    for kind, named_laws in laws.items():
+        for name in named_laws:
             check_name("moving joint that follows no other", name, robot.joint_names, RobotError, name=kind)
     needed = {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}
     parts = RobotParts(robot, needed, forces, outputs, drives)
@@ -182,7 +182,7 @@ def _closed_start(
     if reached is not None:
         return reached
     closed = loops.closed(start, free)
-    driven = ", ".join(name for name, own in zip(robot.joint_names, free, strict=True) if not own)
+    driven = ", ".join(name for name, is_free in zip(robot.joint_names, free, strict=True) if not is_free)
     warn_caller(
         AssemblyWarning(
             f"{robot.name}: the loops, which the file draws closed, may start in another assembly: they could not be "

@@ -84,8 +84,8 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
         if self.vector_part is None:
             return None
         e0, e = body_i.relative_quaternion(body_j.quaternion)
-        along = self.scalar_part * e0 + dot(self.vector_part, e)
-        return jnp.where(along.coefficients[0] < 0, -1.0, 1.0)
+        cosine = self.scalar_part * e0 + dot(self.vector_part, e)
+        return jnp.where(cosine.coefficients[0] < 0, -1.0, 1.0)
 
 
 def constraint_wrenches(closure: Closure) -> np.ndarray:
@@ -112,9 +112,9 @@ def _placed(
         point, *axes = (jnp.moveaxis(x, 0, -1)[:, :, None] for x in local)
         return frame.point(point), [frame.direction(axis) for axis in axes]
 
-    (origin, axes), (other, others) = map(point_and_axes, link_frames)
-    seen = [stack([axis.dot(vector) for axis in axes]) for vector in (other - origin, *others)]
-    return jnp.stack([stacked(part) for part in seen], axis=1)
+    (origin, axes), (point_j, axes_j) = map(point_and_axes, link_frames)
+    components_ = [stack([axis.dot(vector) for axis in axes]) for vector in (point_j - origin, *axes_j)]
+    return jnp.stack([stacked(part) for part in components_], axis=1)
 
 
 def _missing_turn(closure: Closure, rotation: np.ndarray) -> np.ndarray:
@@ -128,11 +128,11 @@ def _missing_turn(closure: Closure, rotation: np.ndarray) -> np.ndarray:
 
         return Rotation.from_matrix(rotation).as_rotvec()
     axis = np.asarray(closure.axis)
-    turned = rotation @ axis
-    across = np.cross(axis, turned)
-    sine = float(np.linalg.norm(across))
-    across = across / sine if sine > 1e-12 else axes_with_z_along(axis)[:, 0]
-    return math.atan2(sine, float(axis @ turned)) * across
+    closing_axis = rotation @ axis
+    normal = np.cross(axis, closing_axis)
+    sine = float(np.linalg.norm(normal))
+    normal = normal / sine if sine > 1e-12 else axes_with_z_along(axis)[:, 0]
+    return math.atan2(sine, float(axis @ closing_axis)) * normal
 
 
 class Loops:
@@ -165,13 +165,13 @@ class Loops:
         count = len(q)
         directions = np.diag(self.scale) if count else np.zeros((1, 0))
         states = np.stack([np.broadcast_to(q, directions.shape), directions], axis=1)
-        placed = _placed(self.tree, (states,), self.frames)  # (coordinates, 2, 4, 3, closures)
-        gap_vectors, rates = placed[0, 0], placed[:count, 1]
+        placements = _placed(self.tree, (states,), self.frames)  # (coordinates, 2, 4, 3, closures)
+        gap_vectors, rates = placements[0, 0], placements[:count, 1]
         gaps, slopes = [], []
         for k, closure in enumerate(self.closures):
-            rotation, turning = gap_vectors[1:, :, k].T, np.swapaxes(rates[:, 1:, :, k], 1, 2) @ gap_vectors[1:, :, k]
+            rotation, omega = gap_vectors[1:, :, k].T, np.swapaxes(rates[:, 1:, :, k], 1, 2) @ gap_vectors[1:, :, k]
             gaps.append(np.concatenate([gap_vectors[0, :, k] / self.size, _missing_turn(closure, rotation)]))
-            spins = 0.5 * (turning - np.swapaxes(turning, 1, 2))[:, [2, 0, 1], [1, 2, 0]]  # angular velocities
+            spins = 0.5 * (omega - np.swapaxes(omega, 1, 2))[:, [2, 0, 1], [1, 2, 0]]  # angular velocities
             slopes.append(np.concatenate([rates[:, 0, :, k] / self.size, spins], axis=1).T)
         return np.array(gaps), np.array(slopes)
 
@@ -218,12 +218,12 @@ class Loops:
 
     def _check_closed(self, q: np.ndarray) -> None:
         gaps, _ = self.gaps(q)
-        open_ = [np.abs(w @ g).max() for w, g in zip(self.wrenches, gaps, strict=True)]
-        worst = int(np.argmax(open_))
-        if not open_[worst] <= 10 * RANK_TOLERANCE:
+        sizes = [np.abs(w @ g).max() for w, g in zip(self.wrenches, gaps, strict=True)]
+        worst = int(np.argmax(sizes))
+        if not sizes[worst] <= 10 * RANK_TOLERANCE:
             message = (
                 f"the loops cannot be closed from the coordinates given: {self.names[worst]} stays open by about "
-                f"{open_[worst]:.2g} (rad, or sizes of the robot); give coordinates q nearer to a closed position, and "
+                f"{sizes[worst]:.2g} (rad, or sizes of the robot); give coordinates q nearer to a closed position, and "
                 "check points and driven joints"
             )
             raise RobotError(message, name=f"closures.{self.names[worst]}")
@@ -233,8 +233,8 @@ class Loops:
 
         Wrenches redundant only in this position, as at a dead point, count as independent: nearby positions decide.
         """
-        split = self._split(q)
-        best = split
+        initial = self._split(q)
+        best = initial
         random = np.random.default_rng(1)  # arbitrary but reproducible directions
         for _ in range(2):
             slopes = np.concatenate([w @ s for (w, _), s in zip(best, self.gaps(q)[1], strict=True)])
@@ -339,5 +339,5 @@ def closure_wrenches(
     if not robot.closures:
         return {}
     loops = Loops(robot)
-    closed = loops.closed(given_coordinates(robot, q))
-    return dict(zip(loops.names, loops.independent(closed), strict=True))
+    position = loops.closed(given_coordinates(robot, q))
+    return dict(zip(loops.names, loops.independent(position), strict=True))

@@ -65,8 +65,8 @@ def coordinate(
 def at_rest(like: SpatialPose) -> SpatialPose:
     """Return the identity pose, at rest, with the shape and the order of another pose."""
     zero = jnp.zeros_like(like.position.coefficients[0])
-    still = SpatialPose.at(zero, jnp.concatenate([jnp.ones_like(zero[:1]), zero]))
-    return each_jet(lambda jet: Jet.constant(jet.coefficients[0], like.order), still)
+    identity = SpatialPose.at(zero, jnp.concatenate([jnp.ones_like(zero[:1]), zero]))
+    return each_jet(lambda jet: Jet.constant(jet.coefficients[0], like.order), identity)
 
 
 class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
@@ -107,8 +107,8 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
         check_choice("kinds", self.kinds, KINDS, MechanismError)
         roles = ROLES[: len(self.bodies)]
         pairs = {self.roles[:2], self.roles[2:]}
-        named = {*self.roles[:2], *self.roles[2:].removeprefix(AT_REST)}
-        if len(self.roles) != 4 or named != set(roles) or any(len({*pair}) != 2 for pair in pairs):
+        used_roles = {*self.roles[:2], *self.roles[2:].removeprefix(AT_REST)}
+        if len(self.roles) != 4 or used_roles != set(roles) or any(len({*pair}) != 2 for pair in pairs):
             message = (
                 f"must name two bodies of each joint by {', '.join(roles)}, such as ijim, or 0 for the third at rest"
             )
@@ -116,8 +116,8 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
 
     def residual(self, *bodies_and_time: Any) -> Jet:
         """Return the deviation of the second joint from following the first."""
-        given = dict(zip(ROLES, bodies_and_time, strict=False)) | {AT_REST: at_rest(bodies_and_time[0])}
-        bodies = [given[role] for role in self.roles]
+        poses = dict(zip(ROLES, bodies_and_time, strict=False)) | {AT_REST: at_rest(bodies_and_time[0])}
+        bodies = [poses[role] for role in self.roles]
         turning = [kind == "turn" for kind in self.kinds.split("-")]
         first = (self.point_1, self.axis_1, self.vector_1, self.opposite_1)
         second = (self.point_2, self.axis_2, self.vector_2, self.opposite_2)
@@ -137,8 +137,8 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
             return self.period
         weight = jnp.abs(self.weight_2 if follower_turns else self.weight_1)
         if leader_turns and follower_turns:
-            whole = (self.weight_1 == jnp.round(self.weight_1)) & (self.weight_2 == jnp.round(self.weight_2))
-            weight = jnp.where(whole, 1.0, weight)
+            are_integers = (self.weight_1 == jnp.round(self.weight_1)) & (self.weight_2 == jnp.round(self.weight_2))
+            weight = jnp.where(are_integers, 1.0, weight)
         return jnp.where(weight == 0, NO_PERIOD, WHOLE_TURN * weight)
 
 

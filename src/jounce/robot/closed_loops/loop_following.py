@@ -37,9 +37,9 @@ def position_at(loops: Loops, position: _Position, target: _Position, free: _Cho
     random positions, and by a whole turn less. The result is None if none of these leads to the target.
     """
     for end in _ends(loops, position, target, free):
-        for way in _ways(loops, position, end, free):
+        for path in _ways(loops, position, end, free):
             reached: np.ndarray | None = position
-            for stop in way:
+            for stop in path:
                 reached = None if reached is None else _followed(loops, reached, stop, free)
             if reached is not None and loops.opening(arrived := np.where(free, reached, target)) <= RANK_TOLERANCE:
                 return arrived
@@ -51,9 +51,9 @@ def _ends(loops: Loops, position: _Position, target: _Position, free: _Chosen) -
     yield target
     turning = np.array([loops.tree.joints[name].turning for name in loops.tree.joint_names], bool)
     for k in np.flatnonzero(turning & ~free & (target != position)):
-        other = target.copy()
-        other[k] -= 2 * np.pi * np.sign(target[k] - position[k])
-        yield other
+        earlier_end = target.copy()
+        earlier_end[k] -= 2 * np.pi * np.sign(target[k] - position[k])
+        yield earlier_end
 
 
 def _ways(loops: Loops, position: _Position, target: _Position, free: _Chosen) -> Iterator[list[_Position]]:
@@ -82,25 +82,25 @@ def _followed(loops: Loops, position: _Position, target: _Position, free: _Chose
     lead = np.where(free, 0.0, (target - position) / loops.scale)
     length = float(np.abs(lead).max(initial=0.0))
     slopes = _slopes(loops, position)
-    share, most = 0.0, min(STRIDE / max(length, 1e-300), 1.0)
-    step = most
-    while share < 1.0:
-        part = min(step, 1.0 - share)
-        change = part * lead
+    fraction, max_step = 0.0, min(STRIDE / max(length, 1e-300), 1.0)
+    step = max_step
+    while fraction < 1.0:
+        increment = min(step, 1.0 - fraction)
+        change = increment * lead
         change[free] = np.linalg.lstsq(slopes[:, free], -slopes @ change, rcond=RANK_TOLERANCE)[0]
         predicted = position + loops.scale * change
         try:
             corrected = loops.closed(predicted, free)
             deviation = np.abs((corrected - predicted) / loops.scale).max() / max(np.abs(change).max(), STRIDE / 10)
-            ahead = _slopes(loops, corrected)
+            next_slopes = _slopes(loops, corrected)
         except RobotError:
-            corrected, deviation, ahead = position, np.inf, slopes
-        if deviation > (PASSED if _is_reversed(slopes[:, free], ahead[:, free]) else STRAY):
-            step = part / 2
-            if step < SHORTEST * most:
+            corrected, deviation, next_slopes = position, np.inf, slopes
+        if deviation > (PASSED if _is_reversed(slopes[:, free], next_slopes[:, free]) else STRAY):
+            step = increment / 2
+            if step < SHORTEST * max_step:
                 return None
             continue
-        position, slopes, share, step = corrected, ahead, share + part, min(2 * part, most)
+        position, slopes, fraction, step = corrected, next_slopes, fraction + increment, min(2 * increment, max_step)
     return np.where(free, position, target)
 
 
@@ -110,7 +110,7 @@ def _slopes(loops: Loops, q: _Position) -> Float[np.ndarray, "row joint"]:
 
 
 def _is_reversed(before: np.ndarray, after: np.ndarray) -> bool:
-    """Return whether the determinant of what the free joints close may have changed its sign."""
+    """Return whether the determinant of the closure equations in the free joints may have changed its sign."""
     sizes = np.linalg.svd(before, compute_uv=False)
     if not before.shape[1] or len(before) < before.shape[1] or sizes[before.shape[1] - 1] <= RANK_TOLERANCE * sizes[0]:
         return False

@@ -39,8 +39,8 @@ def on_body(robot: AbstractRobot, link: str) -> tuple[str, np.ndarray, np.ndarra
     name = robot.moving_links[index]
     if name == link:
         return name, np.zeros(3), np.eye(3)
-    turned = robot.frames[name].rotation.T
-    return name, turned @ position, turned @ rotation
+    to_body = robot.frames[name].rotation.T
+    return name, to_body @ position, to_body @ rotation
 
 
 def rotor_on(base: str, rotor: str) -> JointPlacement:
@@ -93,12 +93,12 @@ class RobotParts:
         ] = {}  # rotors that add up what is followed, by joint and by what it follows
         for joint in self.moving:
             for leader in joint.mimic.weights if joint.mimic is not None and joint.mimic.several else ():
-                taken = {
+                taken_names = {
                     *robot.links,
                     *self.rotors.values(),
-                    *(x for made in self.sums.values() for x in made.values()),
+                    *(x for rotors in self.sums.values() for x in rotors.values()),
                 }
-                self.sums.setdefault(joint.name, {})[leader] = _unused(f"{joint.name}_{leader}{ROTOR}", taken)
+                self.sums.setdefault(joint.name, {})[leader] = _unused(f"{joint.name}_{leader}{ROTOR}", taken_names)
         inner = self._inner()
         merged = {self.moving[k].name for k in inner.union(self.merged)}
         self.coordinates = tuple(name for name in robot.joint_names if name not in merged)
@@ -155,101 +155,103 @@ class RobotParts:
                 bodies = (first.bodies[0], joint.child)
                 joints[self.moving[k - 2].name] = spatial.Spherical(bodies, first.point, np.zeros(3))
                 continue
-            at = self.joint_placement(k)
-            ends = (at.point, np.zeros(3), at.axis_i, at.axis_j)
-            if at.turning:
-                joints[joint.name] = spatial.Revolute(at.bodies, *ends)
+            placement = self.joint_placement(k)
+            ends = (placement.point, np.zeros(3), placement.axis_i, placement.axis_j)
+            if placement.turning:
+                joints[joint.name] = spatial.Revolute(placement.bodies, *ends)
             else:
-                joints[joint.name] = spatial.Prismatic(at.bodies, *ends, at.vector_i, at.vector_j)
+                joints[joint.name] = spatial.Prismatic(placement.bodies, *ends, placement.vector_i, placement.vector_j)
         for joint in self.moving:
             if joint.mimic is not None:
                 follower, offset = joint.name, joint.mimic.offset
                 base = GROUND
                 for leader, rotor in self.sums.get(follower, {}).items():  # each rotor turns on the preceding one
-                    turning = self._add_rotor(rotor, base, joints)
-                    pair = (self._named(leader), turning)
+                    bearing = self._add_rotor(rotor, base, joints)
+                    pair = (self._named(leader), bearing)
                     joints[self._unique_name(f"{follower}_{leader}{GEAR}", joints)] = coupled(
                         *pair, joint.mimic.weights[leader], 0.0, in_space=base == GROUND
                     )
                     base = rotor
                 if joint.mimic.several:
-                    whole = (self._named(follower), rotor_on(GROUND, base))
-                    made = coupled(*whole, 1.0, -offset, in_space=True)
+                    sides = (self._named(follower), rotor_on(GROUND, base))
+                    coupling = coupled(*sides, 1.0, -offset, in_space=True)
                 else:
-                    made = coupled(
+                    coupling = coupled(
                         self._named(joint.mimic.joint), self._named(follower), joint.mimic.multiplier, offset
                     )
-                joints[self._unique_name(f"{follower}_mimic", joints)] = made
+                joints[self._unique_name(f"{follower}_mimic", joints)] = coupling
         for name, rotor in self.rotors.items():
-            turning = self._add_rotor(rotor, GROUND, joints)
+            bearing = self._add_rotor(rotor, GROUND, joints)
             joints[self._unique_name(name + GEAR, joints)] = coupled(
-                self._named(name), turning, 1.0, 0.0, in_space=True
+                self._named(name), bearing, 1.0, 0.0, in_space=True
             )
         return joints
 
     def _add_rotor(self, rotor: str, base: str, joints: dict[str, AbstractConstraint]) -> JointPlacement:
         """Add the bearing of a rotor, and return its placement."""
-        at = rotor_on(base, rotor)
-        joints[self._unique_name(rotor, joints)] = spatial.Revolute(at.bodies, at.point, at.point, at.axis_i, at.axis_j)
-        return at
+        bearing = rotor_on(base, rotor)
+        joints[self._unique_name(rotor, joints)] = spatial.Revolute(
+            bearing.bodies, bearing.point, bearing.point, bearing.axis_i, bearing.axis_j
+        )
+        return bearing
 
-    def _unique_name(self, name: str, taken: Any) -> str:
-        return _unused(name, {*taken, *self.robot.joints, *self.robot.closures})
+    def _unique_name(self, name: str, taken_names: Any) -> str:
+        return _unused(name, {*taken_names, *self.robot.joints, *self.robot.closures})
 
     def closure(self, closure: Closure, wrenches: np.ndarray) -> LinkClosure:
         """Return the closure of a loop, along the directions of wrenches in the frame of the first link."""
         ends = [on_body(self.robot, link) for link in closure.links]
-        points = [at + turned @ p for (_, at, turned), p in zip(ends, closure.points, strict=True)]
-        (first, _, turned), (second, _, other) = ends
-        axes = np.kron(np.eye(2), turned.T)
+        points = [position + rotation @ p for (_, position, rotation), p in zip(ends, closure.points, strict=True)]
+        (first, _, rotation), (second, _, rotation_j) = ends
+        axes = np.kron(np.eye(2), rotation.T)
         attitude = {}
         if np.any(wrenches[:, 3:]):
-            quaternion = from_rotation_matrices(turned @ closure.rotation @ other.T)
+            quaternion = from_rotation_matrices(rotation @ closure.rotation @ rotation_j.T)
             attitude = {"vector_part": quaternion[1:], "scalar_part": float(quaternion[0])}
         return LinkClosure((first, second), points[0], points[1], wrenches @ axes, **attitude)
 
     def driver(self, name: str, law: Any) -> AbstractConstraint:
         """Return the driver of a coordinate."""
-        at = self._named(name)
-        if at.turning:
-            return RotationDriver(at.bodies, at.axis_i, law, at.vector_i, at.vector_j)
-        return SpatialSlideDriver(at.bodies, at.point, np.zeros(3), at.axis_i, law)
+        placement = self._named(name)
+        if placement.turning:
+            return RotationDriver(placement.bodies, placement.axis_i, law, placement.vector_i, placement.vector_j)
+        return SpatialSlideDriver(placement.bodies, placement.point, np.zeros(3), placement.axis_i, law)
 
     def output(self, name: str, joint: str) -> AbstractOutput:
         """Return the coordinate of a joint as an output."""
         check_name("moving joint", joint, [j.name for j in self.moving], RobotError, name=f"outputs.{name}")
-        at = self._named(joint)
-        if at.turning:
-            return RelativeAngleOutput(at.bodies, at.axis_i, at.vector_i, at.vector_j)
-        return SlideOutput(at.bodies, at.point, np.zeros(3), at.axis_i)
+        placement = self._named(joint)
+        if placement.turning:
+            return RelativeAngleOutput(placement.bodies, placement.axis_i, placement.vector_i, placement.vector_j)
+        return SlideOutput(placement.bodies, placement.point, np.zeros(3), placement.axis_i)
 
     def losses(self) -> dict[str, AbstractForce]:
         """Return the dampers and springs of the joints, their dry friction, and the forces that carry links."""
-        forces_found: dict[str, AbstractForce] = self._lifts()
+        forces: dict[str, AbstractForce] = self._lifts()
         for ball in self.balls:
             if ball.damping or ball.friction:
                 parent = on_body(self.robot, self.robot.joints[ball.joints[0]].parent)[0]
                 bodies = (parent, self.robot.joints[ball.joints[-1]].child)
-                forces_found[ball.name + BALL] = BallDamper(bodies, damping=ball.damping, friction=ball.friction)
+                forces[ball.name + BALL] = BallDamper(bodies, damping=ball.damping, friction=ball.friction)
         for joint in self.driven:
-            at, law = self._named(joint.name), friction_law(joint.friction)
-            turn = {"axis_i": at.axis_i, "vector_i": at.vector_i, "vector_j": at.vector_j}
-            ends = {"point_i": at.point, "point_j": np.zeros(3), "vector_i": at.axis_i}
+            placement, law = self._named(joint.name), friction_law(joint.friction)
+            turn = {"axis_i": placement.axis_i, "vector_i": placement.vector_i, "vector_j": placement.vector_j}
+            ends = {"point_i": placement.point, "point_j": np.zeros(3), "vector_i": placement.axis_i}
             if joint.damping:
-                kind, fields = (SpatialTorsionalSpring, turn) if at.turning else (SlideSpring, ends)
-                forces_found[joint.name + DAMPING] = kind(at.bodies, **fields, stiffness=0.0, damping=joint.damping)
+                kind, fields = (SpatialTorsionalSpring, turn) if placement.turning else (SlideSpring, ends)
+                forces[joint.name + DAMPING] = kind(placement.bodies, **fields, stiffness=0.0, damping=joint.damping)
             if joint.stiffness:
-                kind, fields = (SpatialTorsionalSpring, turn) if at.turning else (SlideSpring, ends)
-                free = {"angle" if at.turning else "length": joint.spring_reference}
-                forces_found[joint.name + SPRING] = kind(at.bodies, **fields, stiffness=joint.stiffness, **free)
+                kind, fields = (SpatialTorsionalSpring, turn) if placement.turning else (SlideSpring, ends)
+                reference = {"angle" if placement.turning else "length": joint.spring_reference}
+                forces[joint.name + SPRING] = kind(placement.bodies, **fields, stiffness=joint.stiffness, **reference)
             if joint.friction:
-                kind, fields = (SpatialTorque, turn) if at.turning else (SlideForce, ends)
-                forces_found[joint.name + FRICTION] = kind(at.bodies, **fields, law=law)
-        return forces_found
+                kind, fields = (SpatialTorque, turn) if placement.turning else (SlideForce, ends)
+                forces[joint.name + FRICTION] = kind(placement.bodies, **fields, law=law)
+        return forces
 
     def _lifts(self) -> dict[str, AbstractForce]:
         """Return the forces that carry links with a share of gravity below one."""
-        forces_found: dict[str, AbstractForce] = {}
+        lifts: dict[str, AbstractForce] = {}
         for name, link in self.robot.links.items():
             body, position, rotation = on_body(self.robot, name)
             if link.inertia is None or link.gravity == 1 or body == GROUND:
@@ -257,8 +259,8 @@ class RobotParts:
             weight = link.inertia.mass * (1.0 - link.gravity) * np.asarray(self.robot.gravity)
             center = position + rotation @ np.asarray(link.inertia.center_of_mass)
             law = [repr(float(-x)) for x in weight]
-            forces_found[name + LIFT] = SpatialPointForce((body,), center, law)
-        return forces_found
+            lifts[name + LIFT] = SpatialPointForce((body,), center, law)
+        return lifts
 
     def bodies(self, q: np.ndarray) -> dict[str, Body]:
         """Return the moving bodies with their masses, at the pose that the coordinates give.
@@ -273,20 +275,20 @@ class RobotParts:
             body, position, rotation = on_body(robot, name)
             if link.inertia is not None and body != GROUND:
                 masses[body].append(link.inertia.moved(position, rotation))
-        for ball in self.balls:  # of which the parent does not turn, so that it is as inertia of the link
+        for ball in self.balls:  # its parent does not turn, so that its armature acts as inertia of the link
             if ball.armature:
-                turned = Inertia(0.0, tensor=ball.armature * np.eye(3), strict=False)
-                masses[robot.joints[ball.joints[-1]].child].append(turned)
+                armature = Inertia(0.0, tensor=ball.armature * np.eye(3), strict=False)
+                masses[robot.joints[ball.joints[-1]].child].append(armature)
         bodies = {}
         for name, parts in masses.items():
-            at = forward_kinematics(tree, q[None], name)
-            whole = Inertia.total(parts) if parts else None
+            pose = forward_kinematics(tree, q[None], name)
+            combined = Inertia.total(parts) if parts else None
             bodies[name] = Body(
-                at.position[0].tolist(),
-                orientation=from_rotation_matrices(np.asarray(at.rotation[0])).tolist(),
-                mass=None if whole is None else whole.mass,
-                inertia=None if whole is None else whole.tensor,
-                center_of_mass=None if whole is None else whole.center_of_mass,
+                pose.position[0].tolist(),
+                orientation=from_rotation_matrices(np.asarray(pose.rotation[0])).tolist(),
+                mass=None if combined is None else combined.mass,
+                inertia=None if combined is None else combined.tensor,
+                center_of_mass=None if combined is None else combined.center_of_mass,
             )
         values = dict(zip(robot.joint_names, q.tolist(), strict=True))
         for name, rotor in self.rotors.items():
@@ -335,7 +337,7 @@ def _check_couplings(robot: AbstractRobot) -> None:
             raise RobotError(f"{message}; {advice}", name=f"{where}.armature", value=coupling.armature)
 
 
-def _unused(name: str, taken: Container[str]) -> str:
-    while name in taken:
+def _unused(name: str, taken_names: Container[str]) -> str:
+    while name in taken_names:
         name += "_"
     return name

@@ -56,8 +56,8 @@ class AbstractRobot(Displayed, abc.ABC):
                 "strict=False, where its torque is zero"
             )
             raise RobotError(message, name=f"links.{self.joints[massless[0]].child}.inertia", value=None)
-        given = _by_name("closures", closures, Closure)
-        closures_checked = {name: self._checked_closure(closure) for name, closure in given.items()}
+        closures_by_name = _by_name("closures", closures, Closure)
+        closures_checked = {name: self._checked_closure(closure) for name, closure in closures_by_name.items()}
         self.closures: Mapping[str, Closure] = MappingProxyType(closures_checked)
         self._made = True
 
@@ -69,14 +69,14 @@ class AbstractRobot(Displayed, abc.ABC):
 
     def __reduce__(self) -> tuple[Any, ...]:
         closures = list(self.closures.values())
-        parts = (list(self.links.values()), list(self.joints.values()))
-        return type(self), (self.name, *parts, self.gravity, closures, self.strict, list(self.couplings.values()))
+        elements = (list(self.links.values()), list(self.joints.values()))
+        return type(self), (self.name, *elements, self.gravity, closures, self.strict, list(self.couplings.values()))
 
     def __repr__(self) -> str:
         count = len(self.joint_names)
-        closed = f", closed by {', '.join(self.closures)}" if self.closures else ""
+        closure_text = f", closed by {', '.join(self.closures)}" if self.closures else ""
         joints = "joint" if count == 1 else "joints"
-        return f"<Robot {self.name}: {count} {joints}, {len(self.links)} links{closed}>"
+        return f"<Robot {self.name}: {count} {joints}, {len(self.links)} links{closure_text}>"
 
     @property
     def tree(self) -> Tree:
@@ -113,8 +113,8 @@ class AbstractRobot(Displayed, abc.ABC):
         tree = self._tree
         if any(isinstance(link.inertia, TracedInertia) for link in self.links.values()):
             return ()  # traced masses are unknown: forward dynamics reports joints without inertia
-        moved = ((tree.mass > 0) | tree.inertia.any((1, 2))) @ tree.ancestors[:-1]
-        return tuple(joint.name for joint, some in zip(self.moving_joints, moved, strict=True) if not some)
+        carried_mass = ((tree.mass > 0) | tree.inertia.any((1, 2))) @ tree.ancestors[:-1]
+        return tuple(joint.name for joint, mass in zip(self.moving_joints, carried_mass, strict=True) if not mass)
 
     @property
     def limits(self) -> dict[str, Limits]:
@@ -158,20 +158,20 @@ class AbstractRobot(Displayed, abc.ABC):
             if joint.mimic is not None and not joint.mimic.several:
                 followers[joint.mimic.joint].append(joint)
         return {
-            name: limits_with_followers(name, given.get(name, self.joints[name].limits), others)
-            for name, others in followers.items()
+            name: limits_with_followers(name, given.get(name, self.joints[name].limits), joints)
+            for name, joints in followers.items()
         }
 
     @property
     def base_inertia(self) -> Inertia | None:
         """Inertia of the base and of all links fixed to it, in the frame of the base; None without inertia."""
-        fixed = {name: frame for name, frame in self.frames.items() if frame.body < 0}
-        parts = [
+        base_frames = {name: frame for name, frame in self.frames.items() if frame.body < 0}
+        inertias = [
             inertia.moved(frame.position, frame.rotation)
-            for name, frame in fixed.items()
+            for name, frame in base_frames.items()
             if (inertia := self.links[name].inertia) is not None
         ]
-        return Inertia.total(parts) if parts else None
+        return Inertia.total(inertias) if inertias else None
 
     @property
     def mass(self) -> float:
@@ -200,8 +200,8 @@ class AbstractRobot(Displayed, abc.ABC):
         """
         check_name("link", link, self.links, RobotError, name="link")
         inertia = self.links[link].inertia
-        whole = payload if inertia is None else Inertia.total([inertia, payload])
-        links = {**self.links, link: dataclasses.replace(self.links[link], inertia=whole)}
+        combined = payload if inertia is None else Inertia.total([inertia, payload])
+        links = {**self.links, link: dataclasses.replace(self.links[link], inertia=combined)}
         return self.changed(links=list(links.values()))
 
     def with_inertia(
@@ -248,8 +248,8 @@ class AbstractRobot(Displayed, abc.ABC):
         """
         check_name("link", link, self.links, RobotError, name="link")
         previous = self.links[link].inertia or Inertia(0.0, strict=False)
-        given = {"mass": mass, "center_of_mass": center_of_mass, "tensor": tensor}
-        values: dict[str, Any] = {k: getattr(previous, k) if v is None else v for k, v in given.items()}
+        new_values = {"mass": mass, "center_of_mass": center_of_mass, "tensor": tensor}
+        values: dict[str, Any] = {k: getattr(previous, k) if v is None else v for k, v in new_values.items()}
         if is_traced(values) or isinstance(previous, TracedInertia):
             inertia = TracedInertia(**values)
         else:
@@ -272,15 +272,15 @@ class AbstractRobot(Displayed, abc.ABC):
         for joint in self.joints.values():
             coordinate = positions.get(joint.name)
             if joint.moving and joint.mimic is not None:
-                left = joint.mimic.held(positions)
-                if isinstance(left, Mimic):
-                    joint = dataclasses.replace(joint, mimic=left)
+                remainder = joint.mimic.held(positions)
+                if isinstance(remainder, Mimic):
+                    joint = dataclasses.replace(joint, mimic=remainder)
                 else:
-                    coordinate = left
+                    coordinate = remainder
             if coordinate is not None:
                 held[joint.name] = float(coordinate)
             joints.append(joint if coordinate is None else _fixed_at(joint, float(coordinate)))
-        couplings = [left for x in self.couplings.values() if (left := x.locked(held)) is not None]
+        couplings = [remainder for x in self.couplings.values() if (remainder := x.locked(held)) is not None]
         return self.changed(joints=joints, couplings=couplings)
 
     def with_floating_base(self: Made, sequence: str = "ZYX") -> Made:
@@ -329,31 +329,31 @@ class AbstractRobot(Displayed, abc.ABC):
             message = "these links are fixed to one another already; a closure joins links that move"
             raise RobotError(message, name=f"{where}.links", value=list(closure.links))
         poses = _poses_at_zero(self.joints)
-        (origin, turned), (other, other_turned) = (poses[link] for link in closure.links)
+        (origin, rotation_i), (origin_j, rotation_j) = (poses[link] for link in closure.links)
         points, rotation = closure.points, closure.rotation
         if points.shape == (3,):
-            points = np.array([points, other_turned.T @ (origin + turned @ points - other)])
+            points = np.array([points, rotation_j.T @ (origin + rotation_i @ points - origin_j)])
         if rotation is None:
-            rotation = turned.T @ other_turned
+            rotation = rotation_i.T @ rotation_j
         return dataclasses.replace(closure, points=points, rotation=rotation)
 
     def _check_mimic(self, joint: Joint) -> None:
         for leader in joint.mimic.weights if joint.mimic is not None else ():
             if leader not in self.joint_names:
-                others = did_you_mean(leader, self.joint_names)
-                message = f"must follow a moving joint that follows no other; {others}"
+                suggestion = did_you_mean(leader, self.joint_names)
+                message = f"must follow a moving joint that follows no other; {suggestion}"
                 raise RobotError(message, name=f"joints.{joint.name}.mimic", value=leader)
 
 
-def _by_name(kind: str, parts: Sequence[Any], expected: type | tuple[type, ...]) -> dict[str, Any]:
+def _by_name(kind: str, elements: Sequence[Any], expected: type | tuple[type, ...]) -> dict[str, Any]:
     by_name: dict[str, Any] = {}
-    for k, part in enumerate(parts):
-        if not isinstance(part, expected):
+    for k, element in enumerate(elements):
+        if not isinstance(element, expected):
             names = " or a ".join(x.__name__ for x in (expected if isinstance(expected, tuple) else (expected,)))
-            raise RobotError(f"must be a {names}", name=f"{kind}[{k}]", value=part)
-        if part.name in by_name:
-            raise RobotError("this name is given twice", name=kind, value=part.name)
-        by_name[part.name] = part
+            raise RobotError(f"must be a {names}", name=f"{kind}[{k}]", value=element)
+        if element.name in by_name:
+            raise RobotError("this name is given twice", name=kind, value=element.name)
+        by_name[element.name] = element
     if not by_name and kind == "links":
         raise RobotError("a robot needs at least one link", name=kind)
     return by_name
@@ -364,9 +364,9 @@ def _poses_at_zero(joints: Mapping[str, Joint]) -> dict[str, tuple[np.ndarray, n
     poses: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for joint in joints.values():
         follows = joint.moving and joint.mimic is not None
-        fixed = _fixed_at(joint, joint.mimic.offset if follows and joint.mimic is not None else 0.0)
+        fixed_joint = _fixed_at(joint, joint.mimic.offset if follows and joint.mimic is not None else 0.0)
         position, rotation = poses.setdefault(joint.parent, (np.zeros(3), np.eye(3)))
-        poses[joint.child] = (position + rotation @ fixed.position, rotation @ fixed.rotation)
+        poses[joint.child] = (position + rotation @ fixed_joint.position, rotation @ fixed_joint.rotation)
     return poses
 
 

@@ -31,13 +31,13 @@ def stacked_arguments(count: int, hint: str) -> Callable[[Callable[P, R]], Calla
 
     def decorated(function: Callable[P, R]) -> Callable[P, R]:
         @wraps(function)
-        def called(*arguments: P.args, **options: P.kwargs) -> R:
+        def checked_function(*arguments: P.args, **options: P.kwargs) -> R:
             if len(arguments) > count:
                 message = f"takes {count} arguments without names, not {len(arguments)}; write {hint}"
                 raise RobotError(message, name=function.__name__)
             return function(*arguments, **options)
 
-        return called
+        return checked_function
 
     return decorated
 

@@ -84,10 +84,10 @@ class Tendon:
 
     def locked(self, positions: Mapping[str, float]) -> Tendon | None:
         """Return the tendon of a robot with some joints locked; None if all joints of the tendon are."""
-        held = {joint for joint in self.weights if joint in positions}
-        left = {joint: weight for joint, weight in self.weights.items() if joint not in held}
-        rest = self.rest - sum(self.weights[joint] * positions[joint] for joint in held)
-        return dataclasses.replace(self, weights=left, rest=rest) if left else None
+        locked_joints = {joint for joint in self.weights if joint in positions}
+        remaining = {joint: weight for joint, weight in self.weights.items() if joint not in locked_joints}
+        rest = self.rest - sum(self.weights[joint] * positions[joint] for joint in locked_joints)
+        return dataclasses.replace(self, weights=remaining, rest=rest) if remaining else None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -135,11 +135,11 @@ class BallDrive:
 
     def locked(self, positions: Mapping[str, float]) -> BallDrive | None:
         """Return the drive of a robot with some joints locked; None if all three turns are."""
-        held = [joint for joint in self.joints if joint in positions]
-        if held and len(held) < 3:
+        locked_turns = [joint for joint in self.joints if joint in positions]
+        if locked_turns and len(locked_turns) < 3:
             message = f"is one turn of the ball {self.name}, which has armature, damping or friction; hold all three"
-            raise RobotError(message, name=f"locked.{held[0]}", value=positions[held[0]])
-        return None if held else self
+            raise RobotError(message, name=f"locked.{locked_turns[0]}", value=positions[locked_turns[0]])
+        return None if locked_turns else self
 
 
 Coupling = Tendon | BallDrive
@@ -156,8 +156,8 @@ def check_coupling(coupling: Any, joints: Mapping[str, Any], free: Collection[st
     free : collection of str
         Names of the joints that follow no other joint.
     """
-    moving = [name for name, joint in joints.items() if joint.moving]
-    names = free if isinstance(coupling, BallDrive) else moving
+    moving_joints = [name for name, joint in joints.items() if joint.moving]
+    names = free if isinstance(coupling, BallDrive) else moving_joints
     where = f"couplings.{coupling.name}"
     for name in coupling.joints:
         check_name("moving joint", name, names, RobotError, name=where)

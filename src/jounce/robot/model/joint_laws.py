@@ -102,7 +102,7 @@ GivenLaws = ArrayLike | Callable[..., Any] | Mapping[str, Any] | JointTrajectory
 """Forces of joints: constants, a function of time and state, or one law for each joint by its name."""
 
 
-def joint_laws(names: Sequence[str], given: GivenLaws | None, what: str = "torque") -> AbstractJointLaws:
+def joint_laws(names: Sequence[str], given: GivenLaws | None, argument: str = "torque") -> AbstractJointLaws:
     """Return the checked laws of the joint forces that a user gives.
 
     Parameters
@@ -113,7 +113,7 @@ def joint_laws(names: Sequence[str], given: GivenLaws | None, what: str = "torqu
         None for no forces; constants; a function of time, q and rates of one sample, by operations of JAX, that
         returns n forces; or one law for each joint that has a force: a number, an expression of ``t``, of the names of
         joints and of their rates as ``NAME_d1``, a motion law, or a function that returns one force.
-    what : str
+    argument : str
         Name of the argument, for messages.
 
     Raises
@@ -129,17 +129,17 @@ def joint_laws(names: Sequence[str], given: GivenLaws | None, what: str = "torqu
     if isinstance(given, JointTrajectory):
         given = given.laws
     if callable(given):
-        return JointLaws(nothing, _read(given, count, (count,), what), (), ())
+        return JointLaws(nothing, _read(given, count, (count,), argument), (), ())
     if not isinstance(given, Mapping):
-        constant = np.asarray(floats(what, in_order(what, given, names, RobotError)))
+        constant = np.asarray(floats(argument, in_order(argument, given, names, RobotError)))
         if constant.shape != (count,) or not np.isfinite(constant).all():
             message = f"must hold {count} finite numbers, one for each joint, or be a function, or a mapping of names"
-            raise RobotError(message, name=what, value=constant.tolist())
+            raise RobotError(message, name=argument, value=constant.tolist())
         return JointLaws(constant, None, (), ())
     laws: dict[int, Any] = {}
     for name, law in given.items():
-        check_name("moving joint", name, names, RobotError, name=what)
-        laws[names.index(name)] = _single(law, tuple(names), f"{what}.{name}")
+        check_name("moving joint", name, names, RobotError, name=argument)
+        laws[names.index(name)] = _single(law, tuple(names), f"{argument}.{name}")
     for k in [k for k, law in laws.items() if isinstance(law, float)]:
         nothing[k] = laws.pop(k)
     return JointLaws(nothing, None, tuple(laws.values()), tuple(laws))

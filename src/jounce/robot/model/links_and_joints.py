@@ -208,9 +208,9 @@ class Joint:
 def ranges_at_leader(limits: Limits, followers: Iterable[Joint]) -> list[tuple[float, float]]:
     """Return the range of a joint, and those of its followers as ranges of the joint; infinite without limits."""
     ranges = []
-    every = [(limits, Mimic("")), *((x.limits, x.mimic) for x in followers if x.mimic and x.mimic.multiplier)]
-    for own, mimic in every:
-        ends = (-math.inf if own.lower is None else own.lower, math.inf if own.upper is None else own.upper)
+    pairs = [(limits, Mimic("")), *((x.limits, x.mimic) for x in followers if x.mimic and x.mimic.multiplier)]
+    for bounds, mimic in pairs:
+        ends = (-math.inf if bounds.lower is None else bounds.lower, math.inf if bounds.upper is None else bounds.upper)
         low, high = sorted((x - mimic.offset) / mimic.multiplier + 0.0 for x in ends)  # no -0
         ranges.append((low, high))
     return ranges
@@ -246,31 +246,31 @@ def limits_with_followers(name: str, limits: Limits, followers: Iterable[Joint])
         If the ranges have no coordinate in common, or only one.
     """
     followers = list(followers)
-    every = [(limits, Mimic(name))]
-    every += [(other.limits, other.mimic) for other in followers if other.mimic and other.mimic.multiplier]
-    if len(every) == 1:
+    pairs = [(limits, Mimic(name))]
+    pairs += [(other.limits, other.mimic) for other in followers if other.mimic and other.mimic.multiplier]
+    if len(pairs) == 1:
         return limits
 
-    def least(*fields: str) -> float | None:
+    def smallest(*fields: str) -> float | None:
         """Return the smallest limit, with the first available field of each joint."""
-        given = [(next((x for f in fields if (x := getattr(own, f)) is not None), None), mimic) for own, mimic in every]
+        given = [(next((x for f in fields if (x := getattr(own, f)) is not None), None), mimic) for own, mimic in pairs]
         return min((x / abs(mimic.multiplier) for x, mimic in given if x is not None), default=None)
 
     lower, upper = common_range(ranges_at_leader(limits, followers))
     if not has_room(limits, followers):
-        others = ", ".join(joint.name for joint in followers)
-        word = "no coordinate" if lower > upper else "one coordinate alone"
-        message = f"{word} keeps the range of this joint and of those that follow it ({others}); correct their limits"
+        names = ", ".join(joint.name for joint in followers)
+        phrase = "no coordinate" if lower > upper else "one coordinate alone"
+        message = f"{phrase} keeps the range of this joint and of those that follow it ({names}); correct their limits"
         raise RobotError(message, name=name, value=[lower, upper])
-    slowing = any(own.deceleration is not None for own, _ in every)
+    slowing = any(own.deceleration is not None for own, _ in pairs)
     return dataclasses.replace(
         limits,
         lower=lower if math.isfinite(lower) else None,
         upper=upper if math.isfinite(upper) else None,
-        velocity=least("velocity"),
-        acceleration=least("acceleration"),
-        jerk=least("jerk"),
-        deceleration=least("deceleration", "acceleration") if slowing else None,
+        velocity=smallest("velocity"),
+        acceleration=smallest("acceleration"),
+        jerk=smallest("jerk"),
+        deceleration=smallest("deceleration", "acceleration") if slowing else None,
     )
 
 
@@ -330,8 +330,8 @@ class Closure:
             axis = vector_numbers(f"{where}.axis", self.axis, (3,)) if self.axis is not None else np.zeros(3)
             length = float(np.linalg.norm(axis))
             if length < 1e-9:
-                given = None if self.axis is None else axis.tolist()
-                raise RobotError(f"a {self.type} needs the direction of its axis", name=f"{where}.axis", value=given)
+                value = None if self.axis is None else axis.tolist()
+                raise RobotError(f"a {self.type} needs the direction of its axis", name=f"{where}.axis", value=value)
             object.__setattr__(self, "axis", unchanging(axis / length))
         if self.rotation is not None:
             object.__setattr__(self, "rotation", rotation_matrix(f"{where}.rotation", self.rotation))

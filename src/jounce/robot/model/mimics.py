@@ -81,13 +81,13 @@ def leaders(mimics: Mapping[str, Mimic]) -> dict[str, Mimic]:
 
     Circles stay unchanged; the robot rejects them.
     """
-    mimic_of: dict[str, Mimic] = {}
+    resolved: dict[str, Mimic] = {}
     for name in mimics:
         chain: dict[str, Mimic] = {}  # from a follower to the first joint that is done, or follows no other
-        while name in mimics and name not in mimic_of and name not in chain:
+        while name in mimics and name not in resolved and name not in chain:
             chain[name] = mimics[name]
             name = mimics[name].joint
         circle = name in chain
         for follower, mimic in reversed(chain.items()):
-            mimic_of[follower] = mimic if circle else mimic.after(mimic_of)
-    return mimic_of
+            resolved[follower] = mimic if circle else mimic.after(resolved)
+    return resolved

@@ -192,8 +192,8 @@ def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Join
         waiting += reversed(children[joint.child])
     if len(sorted_joints) < len(joints):
         reached = {joint.name for joint in sorted_joints}
-        lost = [name for name in joints if name not in reached]
-        raise RobotError("these joints form a loop that the base does not reach", name="joints", value=lost)
+        unreached = [name for name in joints if name not in reached]
+        raise RobotError("these joints form a loop that the base does not reach", name="joints", value=unreached)
     return sorted_joints
 
 
@@ -210,7 +210,7 @@ def arrange(
     """
     identity, zero = np.eye(3), np.zeros(3)
     frames = {base: Frame(-1, zero, identity)}
-    parents, placements, masses, moving = [], [], [], []
+    parents, placements, masses, moving_joints = [], [], [], []
     lifted: dict[int, list[tuple[Any, Any]]] = {}
     _lift(lifted, frames[base], links[base])
     for joint in joints:
@@ -220,37 +220,39 @@ def arrange(
             aligned = axes_with_z_along(joint.axis)
             placements.append((position, rotation @ aligned))
             parents.append(body)
-            moving.append(joint)
+            moving_joints.append(joint)
             masses.append([])
-            body, position, rotation = len(moving) - 1, zero, aligned.T
+            body, position, rotation = len(moving_joints) - 1, zero, aligned.T
         frames[joint.child] = Frame(body, position, rotation)
         _lift(lifted, frames[joint.child], links[joint.child])
         inertia = links[joint.child].inertia
         if inertia is not None and body >= 0:
             masses[body].append(inertia.moved(position, rotation))
-    whole = [Inertia.total(parts) if parts else MASSLESS for parts in masses]
+    combined = [Inertia.total(terms) if terms else MASSLESS for terms in masses]
     slots, parent_slots, count = _slots(parents)
-    bodies, order = len(moving), [joint.name for joint in moving if joint.mimic is None]
-    mimics = [joint.mimic or Mimic(joint.name) for joint in moving]  # of others, or of the joint itself
+    bodies, order = len(moving_joints), [joint.name for joint in moving_joints if joint.mimic is None]
+    mimics = [joint.mimic or Mimic(joint.name) for joint in moving_joints]  # of others, or of the joint itself
     coordinate, multiplier = _leaders(mimics, order)
-    friction = np.array([np.broadcast_to(joint.friction, 2) for joint in moving]).reshape(-1, 2) @ FORWARD_BACKWARD
-    single = np.array([not mimic.several for mimic in mimics], float)  # drives of the others couple coordinates
-    factor = multiplier[0] * single
-    parts = {  # by virtual work of those of each joint
-        "armature": factor**2 * [joint.armature for joint in moving],
-        "damping": factor**2 * [joint.damping for joint in moving],
+    friction = (
+        np.array([np.broadcast_to(joint.friction, 2) for joint in moving_joints]).reshape(-1, 2) @ FORWARD_BACKWARD
+    )
+    has_one_leader = np.array([not mimic.several for mimic in mimics], float)  # drives of the others couple coordinates
+    factor = multiplier[0] * has_one_leader
+    terms = {  # by virtual work, from the values of each joint
+        "armature": factor**2 * [joint.armature for joint in moving_joints],
+        "damping": factor**2 * [joint.damping for joint in moving_joints],
         "friction": np.abs(factor) * friction[:, 0],
         "friction_skew": factor * friction[:, 1],
     }
-    drives = {field: np.bincount(coordinate[0], part, len(order)).astype(float) for field, part in parts.items()}
-    tendons, balls = _tendons(moving, order, couplings), _balls(order, couplings)
-    turning = np.array([joint.turning for joint in moving], float)
+    drives = {field: np.bincount(coordinate[0], term, len(order)).astype(float) for field, term in terms.items()}
+    tendons, balls = _tendons(moving_joints, order, couplings), _balls(order, couplings)
+    turning = np.array([joint.turning for joint in moving_joints], float)
     tree = Tree(
         rotation=np.array([rotation for _, rotation in placements]).reshape(bodies, 3, 3),
         position=np.array([position for position, _ in placements]).reshape(bodies, 3),
-        mass=_array([one.mass for one in whole]),
-        center=_array([one.center_of_mass for one in whole]).reshape(bodies, 3),
-        inertia=_array([one.tensor for one in whole]).reshape(bodies, 3, 3),
+        mass=_array([inertia_.mass for inertia_ in combined]),
+        center=_array([inertia_.center_of_mass for inertia_ in combined]).reshape(bodies, 3),
+        inertia=_array([inertia_.tensor for inertia_ in combined]).reshape(bodies, 3, 3),
         turning=turning,
         coordinate=coordinate,
         multiplier=multiplier,
@@ -302,10 +304,10 @@ def _lift(lifted: dict[int, list[tuple[Any, Any]]], frame: Frame, link: Link) ->
     lifted.setdefault(frame.body, []).append((mass, mass * inertia.center_of_mass))
 
 
-def _tendons(moving: Sequence[Joint], order: Sequence[str], couplings: Sequence[Coupling]) -> Tendons:
+def _tendons(moving_joints: Sequence[Joint], order: Sequence[str], couplings: Sequence[Coupling]) -> Tendons:
     """Return springs of joints, drives of followers of several joints, and tendons, at the followed joints."""
     rows = []
-    for joint in moving:
+    for joint in moving_joints:
         losses = (0.0, 0.0, 0.0)
         if joint.mimic is not None and joint.mimic.several:
             if isinstance(joint.friction, tuple):
@@ -316,10 +318,10 @@ def _tendons(moving: Sequence[Joint], order: Sequence[str], couplings: Sequence[
             rows.append(({joint.name: 1.0}, joint.stiffness, joint.spring_reference, *losses))
     lines = [line for line in couplings if isinstance(line, Tendon)]
     rows += [(line.weights, *(getattr(line, field) for field in OF_TENDON)) for line in lines]
-    by_name = {joint.name: joint for joint in moving}
+    by_name = {joint.name: joint for joint in moving_joints}
     weights, numbers = np.zeros((len(rows), len(order))), []
-    for k, (given, stiffness, rest, *others) in enumerate(rows):
-        for name, weight in given.items():
+    for k, (named_weights, stiffness, rest, *others) in enumerate(rows):
+        for name, weight in named_weights.items():
             mimic = by_name[name].mimic or Mimic(name)
             for leader, factor in mimic.weights.items():
                 weights[k, order.index(leader)] += weight * factor
@@ -337,9 +339,9 @@ def _balls(order: Sequence[str], couplings: Sequence[Coupling]) -> Balls:
     return Balls(select, *(np.array([getattr(x, key) for x in drives], float) for key in OF_BALL))
 
 
-def _array(parts: list[Any]) -> Any:
-    """Return parts as one array, a JAX array if JAX traces one of them."""
-    return jnp.stack(parts) if any(isinstance(part, Tracer) for part in parts) else np.array(parts)
+def _array(values: list[Any]) -> Any:
+    """Return values as one array, a JAX array if JAX traces one of them."""
+    return jnp.stack(values) if any(isinstance(value, Tracer) for value in values) else np.array(values)
 
 
 def axes_with_z_along(axis: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
@@ -366,17 +368,17 @@ def quaternion_matrix(quaternion: Float[np.ndarray, " 4"]) -> Float[np.ndarray, 
 
 
 def _slots(parents: list[int]) -> tuple[list[int], list[int], int]:
-    """Return the places of the states of bodies and of their parents; a last child reuses the place of its parent."""
-    last = {parent: k for k, parent in enumerate(parents)}
+    """Return the slots of bodies and of their parents, and their number; a last child reuses the slot of its parent."""
+    last_child = {parent: k for k, parent in enumerate(parents)}
     slots, free, count = {-1: 0}, [], 1
     for k, parent in enumerate(parents):
-        if last[parent] == k:
+        if last_child[parent] == k:
             slots[k] = slots[parent]
         elif free:
             slots[k] = free.pop()
         else:
             slots[k], count = count, count + 1
-        if k not in last:
+        if k not in last_child:
             free.append(slots[k])
     return [slots[k] for k in range(len(parents))], [slots[parent] for parent in parents], count
 

@@ -38,8 +38,8 @@ class RigidInertia(Module):
         zero = jnp.zeros_like(x)
         coupling = mass * jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])
         unit = jnp.reshape(jnp.eye(3), (3, 3) + (1,) * (c.ndim - 1))
-        about = self.tensor + mass * (unit * jnp.sum(c * c, axis=0)[None, None] - c[:, None] * c[None])
-        return about, coupling, unit * mass * jnp.ones_like(x)[None, None]
+        rotational = self.tensor + mass * (unit * jnp.sum(c * c, axis=0)[None, None] - c[:, None] * c[None])
+        return rotational, coupling, unit * mass * jnp.ones_like(x)[None, None]
 
 
 class ArticulatedBodies(Module):
@@ -96,46 +96,48 @@ class ArticulatedBodies(Module):
         """
 
         def inward(state: Any, entry: Any) -> tuple[Any, Any]:
-            body, z, r, own, drive, is_free = entry
-            about, coupling, mass = (a + b for a, b in zip(own.blocks(), read_slot(tree, state, body[0]), strict=True))
-            turned = _product(about, z), _transposed_product(coupling, z)
-            slid = _product(coupling, z), _product(mass, z)
+            body, z, r, rigid, drive, is_free = entry
+            rotational, coupling, mass = (
+                a + b for a, b in zip(rigid.blocks(), read_slot(tree, state, body[0]), strict=True)
+            )
+            by_turn = _product(rotational, z), _transposed_product(coupling, z)
+            by_slide = _product(coupling, z), _product(mass, z)
             if tree.shape.turning and tree.shape.sliding:
-                moment, force = (body[2] * a + (1 - body[2]) * b for a, b in zip(turned, slid, strict=True))
+                moment, force = (body[2] * a + (1 - body[2]) * b for a, b in zip(by_turn, by_slide, strict=True))
             else:
-                moment, force = turned if tree.shape.turning else slid
+                moment, force = by_turn if tree.shape.turning else by_slide
             inertia = jnp.sum(z * (body[2] * moment + (1 - body[2]) * force), axis=0) + drive
-            largest = body[2] * _trace(about) + (1 - body[2]) * _trace(mass) + drive
-            margin = inertia / largest
+            trace = body[2] * _trace(rotational) + (1 - body[2]) * _trace(mass) + drive
+            margin = inertia / trace
             compliance = jnp.where(margin > LEAST_INERTIA, is_free / inertia, jnp.where(is_free > 0, jnp.nan, 0.0))
             moment, force, compliance = materialised((moment, force, compliance))
             by_moment, by_force = (moment * compliance[None])[None], (force * compliance[None])[None]
-            about, coupling = about - moment[:, None] * by_moment, coupling - moment[:, None] * by_force
+            rotational, coupling = rotational - moment[:, None] * by_moment, coupling - moment[:, None] * by_force
             mass = mass - force[:, None] * by_force
             # shift to the origin of the parent
-            first = _rows_crossed(r, coupling)
+            shift = _rows_crossed(r, coupling)
             coupling = coupling + _rows_crossed(r, mass).swapaxes(0, 1)
-            about = about + first + _rows_crossed(r, coupling).swapaxes(0, 1)
-            sent = materialised((about, coupling, mass))
+            rotational = rotational + shift + _rows_crossed(r, coupling).swapaxes(0, 1)
+            passed_inertia = materialised((rotational, coupling, mass))
             if tree.shape.slots > 1:
-                state = write_slot(tree, state, body[0], jax.tree.map(jnp.zeros_like, sent))
-                sent = jax.tree.map(jnp.add, sent, read_slot(tree, state, body[1]))
-            return write_slot(tree, state, body[1], sent), (moment, force, compliance, margin)
+                state = write_slot(tree, state, body[0], jax.tree.map(jnp.zeros_like, passed_inertia))
+                passed_inertia = jax.tree.map(jnp.add, passed_inertia, read_slot(tree, state, body[1]))
+            return write_slot(tree, state, body[1], passed_inertia), (moment, force, compliance, margin)
 
         def by_body(x: Any) -> Any:
             return jnp.moveaxis(x, -2, 0)
 
         nothing = (jnp.zeros((3, 3, axis.shape[-1])),) * 3
-        each = (*(jnp.asarray(x) for x in (tree.slot, tree.parent_slot, tree.turning)),)
-        bodies = (each, by_body(axis), by_body(arm), jax.tree.map(by_body, inertia), armature, free)
-        state, bodies_found = jax.lax.scan(inward, fill_slots(tree, nothing), bodies, reverse=True)
-        moment, force, compliance, margin = bodies_found
+        tree_arrays = (*(jnp.asarray(x) for x in (tree.slot, tree.parent_slot, tree.turning)),)
+        bodies = (tree_arrays, by_body(axis), by_body(arm), jax.tree.map(by_body, inertia), armature, free)
+        state, body_values = jax.lax.scan(inward, fill_slots(tree, nothing), bodies, reverse=True)
+        moment, force, compliance, margin = body_values
         factor = None
         if base is not None:
             base_state = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
-            whole = _six_by_six(*(a + b for a, b in zip(base.blocks(), base_state, strict=True)))
-            scale = 1.0 / jnp.sqrt(jnp.stack([whole[k, k] for k in range(6)]))
-            factor = DenseFactor.of(whole * scale[:, None] * scale[None]), scale
+            base_inertia = _six_by_six(*(a + b for a, b in zip(base.blocks(), base_state, strict=True)))
+            scale = 1.0 / jnp.sqrt(jnp.stack([base_inertia[k, k] for k in range(6)]))
+            factor = DenseFactor.of(base_inertia * scale[:, None] * scale[None]), scale
         moment, force = (jnp.moveaxis(x, 0, 1) for x in (moment, force))
         return cls(tree, axis, arm, moment, force, compliance, margin, factor)
 
@@ -161,35 +163,35 @@ class ArticulatedBodies(Module):
         def inward(state: Any, entry: Any) -> tuple[Any, Any]:
             (slot, parent_slot, turn), z, r, moment, force, compliance, given = entry
             m, f = read_slot(tree, state, slot)
-            left = given - jnp.sum(z * (turn * m + (1 - turn) * f), axis=0)
-            given = (left * compliance)[None]
+            net_force = given - jnp.sum(z * (turn * m + (1 - turn) * f), axis=0)
+            given = (net_force * compliance)[None]
             m, f = m + moment * given, f + force * given
-            sent = m + cross(r, f), f
+            passed_wrench = m + cross(r, f), f
             if tree.shape.slots > 1:
-                state = write_slot(tree, state, slot, jax.tree.map(jnp.zeros_like, sent))
-                sent = jax.tree.map(jnp.add, sent, read_slot(tree, state, parent_slot))
-            return write_slot(tree, state, parent_slot, sent), left
+                state = write_slot(tree, state, slot, jax.tree.map(jnp.zeros_like, passed_wrench))
+                passed_wrench = jax.tree.map(jnp.add, passed_wrench, read_slot(tree, state, parent_slot))
+            return write_slot(tree, state, parent_slot, passed_wrench), net_force
 
         def outward(state: Any, entry: Any) -> tuple[Any, Any]:
-            (slot, parent_slot, turn), z, r, moment, force, compliance, left = entry
+            (slot, parent_slot, turn), z, r, moment, force, compliance, net_force = entry
             spin, shift = read_slot(tree, state, parent_slot)
             shift = shift + cross(spin, r)
-            rate = compliance * (left - jnp.sum(moment * spin + force * shift, axis=0))
+            rate = compliance * (net_force - jnp.sum(moment * spin + force * shift, axis=0))
             spin, shift = spin + z * (turn * rate)[None], shift + z * ((1 - turn) * rate)[None]
             return write_slot(tree, state, slot, (spin, shift)), rate
 
-        each = (jnp.asarray(tree.slot), jnp.asarray(tree.parent_slot), turning)
+        tree_arrays = (jnp.asarray(tree.slot), jnp.asarray(tree.parent_slot), turning)
         rows = (jnp.moveaxis(x, 1, 0) for x in (self.axis, self.arm, self.moment, self.force))
-        bodies = (each, *rows, self.compliance)
+        bodies = (tree_arrays, *rows, self.compliance)
         nothing = jnp.zeros((3, self.axis.shape[-1]))
-        state, left = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies, along), reverse=True)
+        state, net_force = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies, along), reverse=True)
         start, base = (nothing, nothing), None
         if self.base is not None and at_base is not None:
             base_state = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
             inertia, scale = self.base
             base = inertia.solve((at_base - jnp.concatenate(base_state)) * scale) * scale
             start = base[:3], base[3:]
-        _, rate = jax.lax.scan(outward, fill_slots(tree, start), (*bodies, left))
+        _, rate = jax.lax.scan(outward, fill_slots(tree, start), (*bodies, net_force))
         return rate, base
 
 
@@ -210,6 +212,6 @@ def _trace(matrix: Any) -> Any:
     return matrix[0, 0] + matrix[1, 1] + matrix[2, 2]
 
 
-def _six_by_six(about: Any, coupling: Any, mass: Any) -> Any:
-    upper = jnp.concatenate([about, coupling], axis=1)
+def _six_by_six(rotational: Any, coupling: Any, mass: Any) -> Any:
+    upper = jnp.concatenate([rotational, coupling], axis=1)
     return jnp.concatenate([upper, jnp.concatenate([jnp.swapaxes(coupling, 0, 1), mass], axis=1)])

@@ -70,6 +70,6 @@ class Batched:
         return jax.tree.map(plain_derivatives, result)
 
     def _block(self, tree: Any, arrays: tuple[Any, ...], constants: Any, static: tuple[Any, ...]) -> Any:
-        last = tuple(jnp.moveaxis(jnp.asarray(x), 0, -1) for x in arrays)
-        result = self._sample((tree, constants), last, static=static)
+        samples_last = tuple(jnp.moveaxis(jnp.asarray(x), 0, -1) for x in arrays)
+        result = self._sample((tree, constants), samples_last, static=static)
         return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), result)

@@ -33,14 +33,14 @@ def passive_forces(tree: Tree, q: Jet, rate: Jet, order: int) -> Jet:
         weights = jnp.asarray(line.weights)
         length = q.map(lambda x: weights @ x) - jnp.asarray(line.rest)[:, None]
         lengthening = rate.map(lambda x: weights @ x)
-        along = length * jnp.asarray(line.stiffness)[:, None] + lengthening * jnp.asarray(line.damping)[:, None]
-        along = along + _held(_dry(line.friction, lengthening), order)
-        forces = forces + along.map(lambda x: weights.T @ x)
+        tensions = length * jnp.asarray(line.stiffness)[:, None] + lengthening * jnp.asarray(line.damping)[:, None]
+        tensions = tensions + _held(_dry(line.friction, lengthening), order)
+        forces = forces + tensions.map(lambda x: weights.T @ x)
     if tree.shape.balls:
         ball = tree.balls
         axes = _ball_axes(tree, q)
         spin = [_product(axis, _turns_of(tree, rate)) for axis in axes]
-        moments = [part * jnp.asarray(ball.damping)[:, None] + _held(_dry(ball.friction, part), order) for part in spin]
+        moments = [w * jnp.asarray(ball.damping)[:, None] + _held(_dry(ball.friction, w), order) for w in spin]
         forces = forces + _at_turns(tree, axes, moments)
     return forces
 
@@ -66,7 +66,7 @@ def inertial_forces(tree: Tree, q: Jet, rate: Jet, acceleration: Jet) -> Jet:
         theta2 + phi * psi * cosine,
         phi2 - psi2 * sine - psi * theta * cosine,
     ]
-    return forces + _to_coordinates(tree, [part * inertia for part in moments])
+    return forces + _to_coordinates(tree, [moment * inertia for moment in moments])
 
 
 def armature_matrix(tree: Tree, q: Jet) -> Float[Numbers, "order coordinate coordinate batch"]:
@@ -80,11 +80,11 @@ def armature_matrix(tree: Tree, q: Jet) -> Float[Numbers, "order coordinate coor
     if not (tree.shape.armed and tree.shape.balls):
         return stacked(constant)
     select, inertia = jnp.asarray(tree.balls.select), jnp.asarray(tree.balls.armature)
-    same = jnp.einsum("kbi,kbj,b->ij", select, select, inertia)[:, :, None]
-    across = jnp.einsum("bi,bj,b->ijb", select[0], select[2], inertia)
-    across = across + jnp.swapaxes(across, 0, 1)
-    mixed = sin(_turns_of(tree, q)[1]).map(lambda x: jnp.einsum("ijb,bs->ijs", across, x))
-    return stacked(constant + same - mixed)
+    diagonal = jnp.einsum("kbi,kbj,b->ij", select, select, inertia)[:, :, None]
+    off_diagonal = jnp.einsum("bi,bj,b->ijb", select[0], select[2], inertia)
+    off_diagonal = off_diagonal + jnp.swapaxes(off_diagonal, 0, 1)
+    mixed = sin(_turns_of(tree, q)[1]).map(lambda x: jnp.einsum("ijb,bs->ijs", off_diagonal, x))
+    return stacked(constant + diagonal - mixed)
 
 
 def spring_energy(tree: Tree, q: Float[Numbers, "coordinate batch"]) -> Float[Numbers, " batch"]:
@@ -106,8 +106,8 @@ def ball_spin(tree: Tree, q: Jet, rate: Jet) -> Jet:
     first, second, _ = _turns_of(tree, q)
     psi, theta, phi = _turns_of(tree, rate)
     s_theta, c_theta, s_psi, c_psi = sin(second), cos(second), sin(first), cos(first)
-    parts = [phi * c_theta * c_psi - theta * s_psi, phi * c_theta * s_psi + theta * c_psi, psi - phi * s_theta]
-    return Jet(jnp.stack(level) for level in zip(*(part.dense().coefficients for part in parts), strict=True))
+    spin = [phi * c_theta * c_psi - theta * s_psi, phi * c_theta * s_psi + theta * c_psi, psi - phi * s_theta]
+    return Jet(jnp.stack(level) for level in zip(*(component.dense().coefficients for component in spin), strict=True))
 
 
 def _held(values: Any, order: int) -> Jet:
@@ -141,11 +141,11 @@ def _ball_axes(tree: Tree, q: Jet) -> list[list[Jet]]:
 
 def _at_turns(tree: Tree, axes: list[list[Jet]], moments: list[Jet]) -> Jet:
     """Return the generalized forces of moments in the axes of the moved links."""
-    each = [_product([axes[i][k] for i in range(3)], moments) for k in range(3)]
-    return _to_coordinates(tree, each)
+    turn_moments = [_product([axes[i][k] for i in range(3)], moments) for k in range(3)]
+    return _to_coordinates(tree, turn_moments)
 
 
 def _to_coordinates(tree: Tree, moments: list[Jet]) -> Jet:
     select = jnp.asarray(tree.balls.select)
-    parts = [part.map(lambda x, k=k: select[k].T @ x) for k, part in enumerate(moments)]
-    return parts[0] + parts[1] + parts[2]
+    by_turn = [moment.map(lambda x, k=k: select[k].T @ x) for k, moment in enumerate(moments)]
+    return by_turn[0] + by_turn[1] + by_turn[2]

@@ -58,13 +58,13 @@ def body_frames(tree: Tree, q: Series) -> Frames:
     # computed before the scan, where XLA would evaluate sine and cosine again for each use
     turns = (angles, *sine_cosine(angles)) if tree.shape.turning else None
     _, frames = jax.lax.scan(outward, fill_slots(tree, base), (entries(tree), coordinates, turns))
-    arrays = [jnp.moveaxis(jnp.concatenate([x, fixed[None]]), 0, 2) for x, fixed in zip(frames, base, strict=True)]
+    arrays = [jnp.moveaxis(jnp.concatenate([x, root[None]]), 0, 2) for x, root in zip(frames, base, strict=True)]
     position, *axes = (Jet(tuple(x)) for x in arrays[:4])
     return Frames(position, tuple(axes), Jet(tuple(arrays[4])) if levels > 1 else None)
 
 
 def _combined(axes: Any, local: Any) -> Jet:
-    return total(axis * part for axis, part in zip(axes, local, strict=True))
+    return total(axis * component for axis, component in zip(axes, local, strict=True))
 
 
 def link_frame(tree: Tree, q: Series, frame_in_body: Frame) -> Frames:
@@ -161,8 +161,8 @@ def _center_of_mass(tree: Tree, arrays: tuple[Series], constants: Any) -> Any:
     frames = body_frames(tree, arrays[0])
     mass, center = constants
     centers = frames.point(jnp.swapaxes(center, 0, 1)[:, :, None])
-    share = mass / mass.sum()
-    return stacked(centers.map(lambda c: jnp.einsum("cbs,b->cs", c, share)))
+    mass_fraction = mass / mass.sum()
+    return stacked(centers.map(lambda c: jnp.einsum("cbs,b->cs", c, mass_fraction)))
 
 
 def center_of_mass(robot: AbstractRobot, q: ArrayLike) -> Array[Numbers, "*batch derivative 3"]:
@@ -197,8 +197,8 @@ def center_of_mass(robot: AbstractRobot, q: ArrayLike) -> Array[Numbers, "*batch
     base = robot.base_inertia
     if base is None and not robot.moving_links:
         raise RobotError("no link has a mass", name="robot", value=robot.name)
-    whole = Inertia(0.0, strict=False) if base is None else base
-    library = jnp if isinstance(whole, TracedInertia) or isinstance(robot.tree.mass, Tracer) else np
-    mass = library.append(robot.tree.mass, whole.mass)
-    center = library.concatenate([robot.tree.center, whole.center_of_mass[None]])
+    base_inertia = Inertia(0.0, strict=False) if base is None else base
+    library = jnp if isinstance(base_inertia, TracedInertia) or isinstance(robot.tree.mass, Tracer) else np
+    mass = library.append(robot.tree.mass, base_inertia.mass)
+    center = library.concatenate([robot.tree.center, base_inertia.center_of_mass[None]])
     return _center_of_mass(robot, (q,), (mass, center))

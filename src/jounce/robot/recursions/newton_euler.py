@@ -60,7 +60,7 @@ class Turn:
         if not tree.shape.turning:
             return cls(placement[..., None])
         along_z = np.array([0.0, 0.0, 1.0])[None, None, :]
-        constant, across, quarter = placement * along_z, placement * (1 - along_z), placement @ QUARTER
+        constant, transverse, quarter = placement * along_z, placement * (1 - along_z), placement @ QUARTER
         angle = coordinates * jnp.asarray(tree.turning)[:, None, None] if tree.shape.sliding else coordinates
         s, c = [None], [1.0]
         for _ in range(angle.order):
@@ -69,7 +69,7 @@ class Turn:
             c.append(following[1])
         value = angle.coefficients[0][:, None]
         start = (jnp.cos(value), jnp.sin(value))
-        return cls(constant[..., None], across[..., None], quarter[..., None], start, Jet(s), Jet([None, *c[1:]]))
+        return cls(constant[..., None], transverse[..., None], quarter[..., None], start, Jet(s), Jet([None, *c[1:]]))
 
     @property
     def matrix(self) -> Any:
@@ -82,7 +82,7 @@ class Turn:
     def outward(self, vector: Jet) -> Jet:
         """Return a vector in the frame of the body from its components in that of the parent."""
         rows = zip(self.matrix, components(vector), strict=True)
-        return self._turned(total(bilinear(jnp.multiply, row, part) for row, part in rows), 1)
+        return self._turned(total(bilinear(jnp.multiply, row, component) for row, component in rows), 1)
 
     def inward(self, vector: Jet) -> Jet:
         """Return a vector in the frame of the parent from its components in that of the body."""
@@ -92,9 +92,9 @@ class Turn:
         if self.sine is None or self.versine is None:
             return vector
         x, y, z = components(vector)
-        across = [bilinear(jnp.multiply, self.sine, part) for part in (y, x)]
-        first, second = across if sign > 0 else (-across[0], -across[1])
-        x, y = (part + bilinear(jnp.multiply, self.versine, part) for part in (x, y))
+        sine_terms = [bilinear(jnp.multiply, self.sine, component) for component in (y, x)]
+        first, second = sine_terms if sign > 0 else (-sine_terms[0], -sine_terms[1])
+        x, y = (component + bilinear(jnp.multiply, self.versine, component) for component in (x, y))
         return concatenate([x + first, y - second, z])
 
 
@@ -150,9 +150,9 @@ def recursive_newton_euler(
         w, v = turn.outward(w), turn.outward(v + cross(w, _constant(body.position)))
         rate = coordinate.differentiate()
         if tree.shape.turning:
-            turning = rate * body.turning if tree.shape.sliding else rate
+            turn_rate = rate * body.turning if tree.shape.sliding else rate
             x, y, z = components(w)
-            w = concatenate([x, y, z + turning])
+            w = concatenate([x, y, z + turn_rate])
         if tree.shape.sliding:
             slide = coordinate * (1 - body.turning)
             x, y, z = components(w)
@@ -168,7 +168,7 @@ def recursive_newton_euler(
     def inward(state: Any, entry: Any) -> tuple[Any, Any]:
         body, coordinate, turn, (force, moment) = entry
         from_children = read_slot(tree, state, body.slot)
-        force, moment = (own + Jet(tuple(c)) for own, c in zip((force, moment), from_children, strict=True))
+        force, moment = (at_body + Jet(tuple(c)) for at_body, c in zip((force, moment), from_children, strict=True))
         along = Jet(c[2] for c in moment.coefficients)
         if tree.shape.sliding:
             along = along * body.turning + Jet(c[2] for c in force.coefficients) * (1 - body.turning)
@@ -178,14 +178,14 @@ def recursive_newton_euler(
             x, y, _ = components(force)
             at_joint = moment + concatenate([-(slide * y), slide * x, 0 * x])
         parent = turn.inward(force)
-        about = turn.inward(at_joint) + cross(_constant(body.position), parent)
+        parent_moment = turn.inward(at_joint) + cross(_constant(body.position), parent)
         if tree.shape.slots > 1:
             state = write_slot(tree, state, body.slot, jax.tree.map(jnp.zeros_like, from_children))
-            before = read_slot(tree, state, body.parent_slot)
-            sent = tuple(a + stacked(b) for a, b in zip(before, (parent, about), strict=True))
-            state = write_slot(tree, state, body.parent_slot, sent)
+            parent_state = read_slot(tree, state, body.parent_slot)
+            passed_wrench = tuple(a + stacked(b) for a, b in zip(parent_state, (parent, parent_moment), strict=True))
+            state = write_slot(tree, state, body.parent_slot, passed_wrench)
         else:
-            state = (stacked(parent), stacked(about))
+            state = (stacked(parent), stacked(parent_moment))
         return state, (stacked(along), stacked(force), stacked(moment))
 
     _, by_body = jax.lax.scan(outward, fill_slots(tree, base), bodies)

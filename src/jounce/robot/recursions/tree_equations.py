@@ -130,16 +130,16 @@ class TreeEquations(Module):
         turn = Turn.of(tree, Jet([joints[:, None]]))
 
         def outward(state: Any, entry: Any) -> tuple[Any, Any]:
-            slot, parent_slot, position, slides, turned, coordinate = entry
+            slot, parent_slot, position, slides, rotation, coordinate = entry
             parent = read_slot(tree, state, parent_slot)
-            columns = [total(parent[:, k] * turned.matrix[k, j][None] for k in range(3)) for j in range(3)]
+            columns = [total(parent[:, k] * rotation.matrix[k, j][None] for k in range(3)) for j in range(3)]
             axes = jnp.stack(columns, axis=1)
             arm = total(parent[:, k] * position[k] for k in range(3)) + axes[:, 2] * (slides * coordinate)[None]
             return write_slot(tree, state, slot, axes), (axes, arm)
 
         start = jnp.broadcast_to(jnp.eye(3)[..., None], (3, 3, lanes)) if base is None else base.axes
-        each = (tree.slot, tree.parent_slot, tree.position, 1 - jnp.asarray(tree.turning))
-        bodies = (*map(jnp.asarray, each), turn, joints)
+        tree_arrays = (tree.slot, tree.parent_slot, tree.position, 1 - jnp.asarray(tree.turning))
+        bodies = (*map(jnp.asarray, tree_arrays), turn, joints)
         _, (axes, arm) = jax.lax.scan(outward, fill_slots(tree, start), bodies)
         return TreeState(coordinates, rates, jnp.moveaxis(axes, 0, 2), jnp.moveaxis(arm, 0, 1), base)
 
@@ -158,7 +158,7 @@ class TreeEquations(Module):
             return TreeFactor(bodies, None, free, motion.base)
         return TreeFactor(None, self._coupled(motion, free), free, motion.base)
 
-    def _coupled(self, motion: TreeState, free: Any) -> tuple[DenseFactor, Any]:
+    def _coupled(self, motion: TreeState, is_free_: Any) -> tuple[DenseFactor, Any]:
         """Return the factored mass matrix of a tree whose drives or followers couple joints, scaled, and the scales."""
         lanes, count = motion.axes.shape[-1], self.tree.shape.coordinates
         size = count + (6 if motion.base is not None else 0)
@@ -167,9 +167,9 @@ class TreeEquations(Module):
         units = jnp.broadcast_to(jnp.eye(size)[..., None], (size, size, lanes))
         directions = Unknowns(units[:, :count], None if motion.base is None else units[:, count:])
         matrix = jnp.concatenate([x for x in jax.vmap(slope)(directions) if x is not None], axis=1)
-        is_free = jnp.concatenate([free, jnp.ones(size - count)])[:, None]
-        matrix = matrix * is_free[:, None] * is_free[None]
-        matrix = matrix + jnp.eye(size)[..., None] * (1.0 - is_free[:, None])
+        mask = jnp.concatenate([is_free_, jnp.ones(size - count)])[:, None]
+        matrix = matrix * mask[:, None] * mask[None]
+        matrix = matrix + jnp.eye(size)[..., None] * (1.0 - mask[:, None])
         scale = 1.0 / jnp.sqrt(jnp.stack([matrix[k, k] for k in range(size)]))
         return DenseFactor.of(matrix * scale[:, None] * scale[None]), scale
 
@@ -187,37 +187,37 @@ class TreeEquations(Module):
             spin0, spin_rate0 = _combined(base.axes, w), _combined(base.axes, unknowns.base[3:])
             shift0 = shift0 + _combined(base.axes, unknowns.base[:3] + cross(w, v))
         turn = z * (turning * rates)
-        before = sums_at_parents(tree, turn, spin0)
-        arm_rate = cross(before, arm)
-        spin_rate = cross(before, turn) + z * (turning * accelerations)
-        spin_rate_before = sums_at_parents(tree, spin_rate, spin_rate0)
-        shift = cross(spin_rate_before, arm)
+        parent_spin = sums_at_parents(tree, turn, spin0)
+        arm_rate = cross(parent_spin, arm)
+        spin_rate = cross(parent_spin, turn) + z * (turning * accelerations)
+        parent_spin_rate = sums_at_parents(tree, spin_rate, spin_rate0)
+        shift = cross(parent_spin_rate, arm)
         if tree.shape.sliding:
             slide = z * ((1 - turning) * rates)
             arm_rate = arm_rate + slide
-            shift = shift + cross(before, slide) + z * ((1 - turning) * accelerations)
-        shift = shift + cross(before, arm_rate)
+            shift = shift + cross(parent_spin, slide) + z * ((1 - turning) * accelerations)
+        shift = shift + cross(parent_spin, arm_rate)
         acceleration = sums_at_parents(tree, shift, shift0) + shift
-        of_bodies, rate = (tree.mass, tree.center, tree.inertia), spin_rate_before + spin_rate
-        force, moment = _of_inertia(motion.axes, of_bodies, before + turn, rate, acceleration)
-        if (pushed := self._pushed(motion, wrenches)) is not None:
-            force, moment = force - pushed[:3, :-1], moment - pushed[3:, :-1]
+        of_bodies, rate = (tree.mass, tree.center, tree.inertia), parent_spin_rate + spin_rate
+        force, moment = _of_inertia(motion.axes, of_bodies, parent_spin + turn, rate, acceleration)
+        if (external := self._pushed(motion, wrenches)) is not None:
+            force, moment = force - external[:3, :-1], moment - external[3:, :-1]
         force, base_force = totals(tree, force)
         moment, base_moment = totals(tree, moment, cross(arm, force))
-        along = jnp.sum(z * moment, axis=0)
+        joint_forces = jnp.sum(z * moment, axis=0)
         if tree.shape.sliding:
-            along = turning[0] * along + (1 - turning[0]) * jnp.sum(z * force, axis=0)
-        forces = to_coordinates(tree, along[None])[0]
+            joint_forces = turning[0] * joint_forces + (1 - turning[0]) * jnp.sum(z * force, axis=0)
+        forces = to_coordinates(tree, joint_forces[None])[0]
         if self.drives:
             q, rate, acceleration = (Jet([x]) for x in (motion.coordinates, motion.rates, unknowns.joints))
-            needed = inertial_forces(tree, q, rate, acceleration) + passive_forces(tree, q, rate, 0)
-            forces = forces + needed.coefficients[0]
+            drive_forces = inertial_forces(tree, q, rate, acceleration) + passive_forces(tree, q, rate, 0)
+            forces = forces + drive_forces.coefficients[0]
         if base is None or self.base is None:
             return Unknowns(forces, None)
-        own = _of_inertia(base.axes, dataclasses.astuple(self.base), spin0, spin_rate0, shift0)
-        base_force, base_moment = base_force + own[0], base_moment + own[1]
-        if pushed is not None:
-            base_force, base_moment = base_force - pushed[:3, -1], base_moment - pushed[3:, -1]
+        at_base = _of_inertia(base.axes, dataclasses.astuple(self.base), spin0, spin_rate0, shift0)
+        base_force, base_moment = base_force + at_base[0], base_moment + at_base[1]
+        if external is not None:
+            base_force, base_moment = base_force - external[:3, -1], base_moment - external[3:, -1]
         return Unknowns(forces, jnp.concatenate([_local(base.axes, x) for x in (base_force, base_moment)]))
 
     @by_certain_entries()
@@ -226,19 +226,19 @@ class TreeEquations(Module):
         tree, base = self.tree, motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
         z, rates = motion.axes[:, 2], at_joints(tree, motion.rates)[None]
-        moved, spin0 = None, jnp.zeros((3, motion.axes.shape[-1]))
+        base_rates, spin0 = None, jnp.zeros((3, motion.axes.shape[-1]))
         if base is not None and unknowns.base is not None:
             v, w = base.twist[:3], base.twist[3:]
             spin0 = _combined(base.axes, w)
             change = quaternion_change(base.quaternion, w)
-            moved = FreeBase(_combined(base.axes, v), change, cross(spin0[:, None], base.axes), unknowns.base)
+            base_rates = FreeBase(_combined(base.axes, v), change, cross(spin0[:, None], base.axes), unknowns.base)
         turn = z * (turning * rates)
-        before = sums_at_parents(tree, turn, spin0)
-        arm = cross(before, motion.arm)
+        parent_spin = sums_at_parents(tree, turn, spin0)
+        arm = cross(parent_spin, motion.arm)
         if tree.shape.sliding:
             arm = arm + z * ((1 - turning) * rates)
-        axes = cross((before + turn)[:, None], motion.axes)
-        return TreeState(motion.rates, unknowns.joints, axes, arm, moved)
+        axes = cross((parent_spin + turn)[:, None], motion.axes)
+        return TreeState(motion.rates, unknowns.joints, axes, arm, base_rates)
 
     def energy(self, motion: TreeState) -> tuple[Float[Numbers, " batch"], Float[Numbers, " batch"]]:
         """Return the kinetic energy, with that of armatures, and the potential energy of gravity and springs, J."""
@@ -250,21 +250,21 @@ class TreeEquations(Module):
             velocity0 = _combined(base.axes, base.twist[:3])
         z, rates = motion.axes[:, 2], at_joints(tree, motion.rates)[None]
         turn = z * (turning * rates)
-        before = sums_at_parents(tree, turn, spin0)
-        shift = cross(before, motion.arm) + z * ((1 - turning) * rates)
+        parent_spin = sums_at_parents(tree, turn, spin0)
+        shift = cross(parent_spin, motion.arm) + z * ((1 - turning) * rates)
         velocity = sums_at_parents(tree, shift, velocity0) + shift
         position = sums_at_parents(tree, motion.arm, place0) + motion.arm
         of_bodies = (tree.mass, tree.center, tree.inertia)
-        parts = [_energies(motion.axes, of_bodies, before + turn, velocity, position, tree.gravity)]
+        energies = [_energies(motion.axes, of_bodies, parent_spin + turn, velocity, position, tree.gravity)]
         if base is not None and self.base is not None:
-            own = dataclasses.astuple(self.base)
-            parts.append(_energies(base.axes, own, spin0, velocity0, place0, tree.gravity))
-        kinetic, potential = (total(part[k] for part in parts) for k in (0, 1))
+            base_inertia = dataclasses.astuple(self.base)
+            energies.append(_energies(base.axes, base_inertia, spin0, velocity0, place0, tree.gravity))
+        kinetic, potential = (total(body_energies[k] for body_energies in energies) for k in (0, 1))
         if tree.shape.lifted:
             axes, positions = (_with_base(a, b, base) for a, b in ((motion.axes, "axes"), (position, "position")))
-            first = positions * jnp.asarray(tree.lift)[None, :, None]
-            first = first + _combined(axes, jnp.swapaxes(jnp.asarray(tree.lift_moment), 0, 1)[:, :, None])
-            potential = potential + jnp.sum(jnp.asarray(tree.gravity)[:, None, None] * first, axis=(0, 1))
+            moments = positions * jnp.asarray(tree.lift)[None, :, None]
+            moments = moments + _combined(axes, jnp.swapaxes(jnp.asarray(tree.lift_moment), 0, 1)[:, :, None])
+            potential = potential + jnp.sum(jnp.asarray(tree.gravity)[:, None, None] * moments, axis=(0, 1))
         if self.drives:
             armature = jnp.asarray(tree.armature)[:, None]
             kinetic = kinetic + 0.5 * jnp.sum(armature * motion.rates * motion.rates, axis=0)
@@ -283,20 +283,20 @@ class TreeEquations(Module):
         if not wrenches and not tree.shape.lifted:
             return None
         axes = _with_base(motion.axes, "axes", motion.base)
-        whole = jnp.zeros((6, *axes.shape[2:]))
+        loads = jnp.zeros((6, *axes.shape[2:]))
         if tree.shape.lifted:
-            down = jnp.broadcast_to(jnp.asarray(tree.gravity)[:, None, None], (3, *axes.shape[2:]))
+            gravity = jnp.broadcast_to(jnp.asarray(tree.gravity)[:, None, None], (3, *axes.shape[2:]))
             moment = _combined(axes, jnp.swapaxes(jnp.asarray(tree.lift_moment), 0, 1)[:, :, None])
-            whole = whole - jnp.concatenate([down * jnp.asarray(tree.lift)[None, :, None], cross(moment, down)])
+            loads = loads - jnp.concatenate([gravity * jnp.asarray(tree.lift)[None, :, None], cross(moment, gravity)])
         for value, (body, point, rotation), in_scene in zip(wrenches, self.frames, self.global_axes, strict=True):
-            own = jax.lax.dynamic_index_in_dim(axes, body, 2, keepdims=False)
+            link_axes = jax.lax.dynamic_index_in_dim(axes, body, 2, keepdims=False)
             force, torque = value[:3], value[3:]
             if not in_scene:
-                turned = jnp.stack([total(own[:, k] * rotation[k, j] for k in range(3)) for j in range(3)], axis=1)
-                force, torque = _combined(turned, force), _combined(turned, torque)
-            arm = total(own[:, k] * point[k] for k in range(3))
-            whole = whole + of_one_body(jnp.concatenate([force, torque + cross(arm, force)]), body, whole.shape[1])
-        return whole
+                frame = jnp.stack([total(link_axes[:, k] * rotation[k, j] for k in range(3)) for j in range(3)], axis=1)
+                force, torque = _combined(frame, force), _combined(frame, torque)
+            arm = total(link_axes[:, k] * point[k] for k in range(3))
+            loads = loads + of_one_body(jnp.concatenate([force, torque + cross(arm, force)]), body, loads.shape[1])
+        return loads
 
 
 class TreeFactor(Module):
@@ -323,8 +323,8 @@ class TreeFactor(Module):
         if self.bodies is None:
             assert self.dense is not None
             (factor, scale), count = self.dense, len(self.free)
-            given = [missing.joints * self.free[:, None]] + ([] if missing.base is None else [missing.base])
-            solution = factor.solve(jnp.concatenate(given) * scale) * scale
+            stacked_forces = [missing.joints * self.free[:, None]] + ([] if missing.base is None else [missing.base])
+            solution = factor.solve(jnp.concatenate(stacked_forces) * scale) * scale
             return Unknowns(solution[:count] * self.free[:, None], None if missing.base is None else solution[count:])
         if self.base is None or missing.base is None:
             return Unknowns(self.bodies.solve(missing.joints)[0], None)
@@ -336,13 +336,13 @@ class TreeFactor(Module):
 
 
 def _with_base(values: Any, field: str, base: FreeBase | None) -> Any:
-    """Return axes or positions of the bodies and, last, of the base, which is the scene unless free."""
+    """Return axes or positions of the bodies and, last, of the base; a fixed base coincides with the scene."""
     if base is not None:
-        last = getattr(base, field)
+        base_value = getattr(base, field)
     else:
         start = jnp.eye(3) if field == "axes" else jnp.zeros(3)
-        last = jnp.broadcast_to(start[..., None], (*start.shape, values.shape[-1]))
-    return jnp.concatenate([values, last[..., None, :]], axis=-2)
+        base_value = jnp.broadcast_to(start[..., None], (*start.shape, values.shape[-1]))
+    return jnp.concatenate([values, base_value[..., None, :]], axis=-2)
 
 
 def free_base(position: Any, quaternion: Any, twist: Any) -> FreeBase:
@@ -359,10 +359,10 @@ def _local(axes: Any, vector: Any) -> Any:
     return jnp.stack([jnp.sum(axes[:, k] * vector, axis=0) for k in range(3)])
 
 
-def _columns(values: tuple[Any, Any, Any], many: bool) -> tuple[Any, Any, Any]:
+def _columns(values: tuple[Any, Any, Any], is_batch: bool) -> tuple[Any, Any, Any]:
     """Return mass, center and tensor with components first and a batch of size one last."""
     mass, center, tensor = map(jnp.asarray, values)
-    if many:
+    if is_batch:
         return mass[None, :, None], jnp.moveaxis(center, 0, -1)[..., None], jnp.moveaxis(tensor, 0, -1)[..., None]
     return mass[None, None], center[:, None], tensor[..., None]
 
@@ -370,18 +370,18 @@ def _columns(values: tuple[Any, Any, Any], many: bool) -> tuple[Any, Any, Any]:
 def _turned_inertia(axes: Any, mass: Any, center: Any, tensor: Any) -> RigidInertia:
     mass, center, tensor = _columns((mass, center, tensor), axes.ndim > 3)
     half = [total(axes[:, k] * tensor[k, j][None] for k in range(3)) for j in range(3)]
-    turned = total(half[j][:, None] * axes[None, :, j] for j in range(3))
-    return RigidInertia(mass[0], _combined(axes, center), turned)
+    rotated = total(half[j][:, None] * axes[None, :, j] for j in range(3))
+    return RigidInertia(mass[0], _combined(axes, center), rotated)
 
 
 def _energies(axes: Any, values: tuple[Any, ...], spin: Any, velocity: Any, position: Any, gravity: Any) -> list[Any]:
     """Return the total kinetic and potential energies of bodies, or of one body."""
     mass, center, tensor = _columns((values[0], values[1], values[2]), axes.ndim > 3)
     arm, w = _combined(axes, center), _local(axes, spin)
-    moved, momentum = velocity + cross(spin, arm), total(tensor[:, k] * w[k : k + 1] for k in range(3))
-    down = jnp.reshape(jnp.asarray(gravity), (3,) + (1,) * (arm.ndim - 1))
-    kinetic = 0.5 * jnp.sum(mass * moved * moved + w * momentum, axis=0)
-    potential = -jnp.sum(mass * down * (position + arm), axis=0)
+    center_velocity, momentum = velocity + cross(spin, arm), total(tensor[:, k] * w[k : k + 1] for k in range(3))
+    gravity_ = jnp.reshape(jnp.asarray(gravity), (3,) + (1,) * (arm.ndim - 1))
+    kinetic = 0.5 * jnp.sum(mass * center_velocity * center_velocity + w * momentum, axis=0)
+    potential = -jnp.sum(mass * gravity_ * (position + arm), axis=0)
     return [jnp.sum(x.reshape(-1, x.shape[-1]), axis=0) for x in (kinetic, potential)]
 
 

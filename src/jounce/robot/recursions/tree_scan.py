@@ -31,7 +31,7 @@ def at_joints(tree: Tree, values: Float[Numbers, "*leading coordinate batch"]) -
     """Return changes of the joints of the bodies, such as rates, from those of the coordinates."""
     if tree.shape.direct:
         return values
-    return total(jnp.take(values, at, axis=-2) * by for at, by in _followed(tree, values.ndim))
+    return total(jnp.take(values, index, axis=-2) * multiplier for index, multiplier in _followed(tree, values.ndim))
 
 
 def to_coordinates(
@@ -40,17 +40,17 @@ def to_coordinates(
     """Return generalized forces from joint forces of the bodies."""
     if tree.shape.direct:
         return forces
-    whole = jnp.zeros((*forces.shape[:-2], tree.shape.coordinates, forces.shape[-1]))
-    for at, by in _followed(tree, forces.ndim):
-        whole = whole.at[..., at, :].add(forces * by)
-    return whole
+    coordinate_forces = jnp.zeros((*forces.shape[:-2], tree.shape.coordinates, forces.shape[-1]))
+    for index, multiplier in _followed(tree, forces.ndim):
+        coordinate_forces = coordinate_forces.at[..., index, :].add(forces * multiplier)
+    return coordinate_forces
 
 
 def _followed(tree: Tree, dimensions: int) -> Iterator[tuple[Any, Any]]:
     """Yield the first coordinates that joints follow and their multipliers, then the second, and so on."""
     shape = (*(1,) * (dimensions - 2), -1, 1)
-    for at, by in zip(jnp.asarray(tree.coordinate), jnp.asarray(tree.multiplier), strict=True):
-        yield at, jnp.reshape(by, shape)
+    for index, multiplier in zip(jnp.asarray(tree.coordinate), jnp.asarray(tree.multiplier), strict=True):
+        yield index, jnp.reshape(multiplier, shape)
 
 
 def entries(tree: Tree) -> Tree:
@@ -86,8 +86,8 @@ def of_one_body(value: Any, body: Any, count: int) -> Any:
 
     The function compares indices, because machine code has no indexing at places unknown in advance.
     """
-    here = jnp.reshape(jnp.arange(count) == body, (1, count) + (1,) * (value.ndim - 1))
-    return jnp.where(here, value[:, None], 0.0)
+    is_body = jnp.reshape(jnp.arange(count) == body, (1, count) + (1,) * (value.ndim - 1))
+    return jnp.where(is_body, value[:, None], 0.0)
 
 
 def materialised(value: Any) -> Any:
