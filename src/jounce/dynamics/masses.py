@@ -49,7 +49,7 @@ def masses_of(mechanism: Mechanism) -> Masses:
             raise MechanismError("a body with an inertia needs a mass, too", name=f"bodies.{name}.mass")
         mass, center, inertia = body_mass(name, body, mechanism.parameter_values, size, solid=False)
         columns.append((mass, center, inertia * np.eye(3) if tensor and np.ndim(inertia) < 2 else inertia))
-    masses, centers, inertias = (along_instances(*part) for part in zip(*columns, strict=True))
+    masses, centers, inertias = (along_instances(*column) for column in zip(*columns, strict=True))
     # for a planar body only the sum of the two second moments is known, and only it counts
     moments = second_moments(inertias) if tensor else np.eye(2)[..., None, None] * (0.5 * inertias)[None, None]
     return Masses(masses, centers, moments)
@@ -61,7 +61,7 @@ def second_moments(tensor: Float[Numbers, "3 3 *batch"]) -> Float[Numbers, "3 3 
     return (tensor[0, 0] + tensor[1, 1] + tensor[2, 2])[None, None] / 2 * unit - tensor
 
 
-def required_masses(mechanism: Mechanism, what: str = "energies") -> Masses:
+def required_masses(mechanism: Mechanism, purpose: str = "energies") -> Masses:
     """Return the masses of all bodies.
 
     Raises
@@ -70,20 +70,20 @@ def required_masses(mechanism: Mechanism, what: str = "energies") -> Masses:
         If no body has a mass or an inertia, or a body has an inertia and no mass is given.
     """
     masses = masses_of(mechanism)
-    known = [part for part in (masses.mass, masses.moments) if not isinstance(part, Tracer)]
-    if len(known) == 2 and not any(map(np.any, known)):
-        raise MechanismError(f"no body has a mass; {what} need some", name="bodies")
+    values = [value for value in (masses.mass, masses.moments) if not isinstance(value, Tracer)]
+    if len(values) == 2 and not any(map(np.any, values)):
+        raise MechanismError(f"no body has a mass; {purpose} need some", name="bodies")
     return masses
 
 
-def stored_masses(model: Model, mechanism: Mechanism, what: str) -> Masses:
+def stored_masses(model: Model, mechanism: Mechanism, purpose: str) -> Masses:
     """Return the masses of all bodies, as `required_masses` does, kept with the model of the mechanism.
 
     A stored model is that of a mechanism with the same values (`mechanism.building.contents`), masses among them.
     """
     values = vars(model)
     if "masses" not in values:
-        values["masses"] = owned_arrays(required_masses(mechanism, what))
+        values["masses"] = owned_arrays(required_masses(mechanism, purpose))
     return values["masses"]
 
 
@@ -102,5 +102,5 @@ def gravity_of(mechanism: Mechanism) -> Gravity:
         If it is not a vector of finite numbers.
     """
     size = POSITION_COMPONENTS[mechanism.space]
-    given = [0.0] * size if mechanism.gravity is None else mechanism.gravity
-    return resolved(given, "gravity", "vector", size, mechanism.parameter_values)[:, None, None]
+    components = [0.0] * size if mechanism.gravity is None else mechanism.gravity
+    return resolved(components, "gravity", "vector", size, mechanism.parameter_values)[:, None, None]

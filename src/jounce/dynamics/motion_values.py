@@ -52,14 +52,14 @@ def in_small_chunks(function: Callable[..., Values], size: int, *arrays: Any) ->
     chunk_count = -(-count // size)
     filled = np.minimum(np.arange(chunk_count * size), count - 1)
 
-    def split(array: Any) -> Any:
-        whole = array if count % size == 0 else array[..., filled]
-        return jnp.moveaxis(whole.reshape(*array.shape[:-1], chunk_count, size), -2, 0)
+    def chunked(array: Any) -> Any:
+        padded = array if count % size == 0 else array[..., filled]
+        return jnp.moveaxis(padded.reshape(*array.shape[:-1], chunk_count, size), -2, 0)
 
-    def joined(parts: Any) -> Any:
-        return jnp.moveaxis(parts, 0, -2).reshape(*parts.shape[1:-1], chunk_count * size)[..., :count]
+    def unchunked(chunks: Any) -> Any:
+        return jnp.moveaxis(chunks, 0, -2).reshape(*chunks.shape[1:-1], chunk_count * size)[..., :count]
 
-    return jax.tree.map(joined, jax.lax.map(lambda some: function(*some), jax.tree.map(split, arrays)))
+    return jax.tree.map(unchunked, jax.lax.map(lambda chunk: function(*chunk), jax.tree.map(chunked, arrays)))
 
 
 def pose_of(coordinates: Coordinates, pose_type: type[Pose], order: int | None = None) -> Any:

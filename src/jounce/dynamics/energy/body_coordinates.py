@@ -86,11 +86,11 @@ def balanced_bodies(motion: Motion, rates: int, *, gravity: bool) -> "xarray.Dat
 
 
 def _of_bodies(
-    motion: Motion, program: Mapped, shared: Any, needed: int, power: int = 0, **static: Any
+    motion: Motion, program: Mapped, shared: Any, min_order: int, power: int = 0, **static: Any
 ) -> "xarray.DataArray":
     """Return the labeled values of a program of the body coordinates along a motion.
 
-    The program needs derivatives to order `needed`.
+    The program needs derivatives to order `min_order`.
 
     Raises
     ------
@@ -98,10 +98,10 @@ def _of_bodies(
         If the motion has too few derivatives.
     """
     mechanism, coordinates = motion.mechanism, motion.poses[1]
-    if len(coordinates["position"]) - 1 < needed:
-        raise MechanismError(f"this needs a motion of order {needed} or higher", name="order", value=motion.order)
-    values = program.along(shared, cut(coordinates, needed), pose_type=motion.poses[0], **static)
-    values = np.where(spoiled(motion.passages, motion.time, needed), np.nan, values)
+    if len(coordinates["position"]) - 1 < min_order:
+        raise MechanismError(f"this needs a motion of order {min_order} or higher", name="order", value=motion.order)
+    values = program.along(shared, cut(coordinates, min_order), pose_type=motion.poses[0], **static)
+    values = np.where(spoiled(motion.passages, motion.time, min_order), np.nan, values)
     names = COLUMNS[mechanism.space]
     efforts = ["N" if name in "xyz" else "N*m" for name in names] * len(mechanism.bodies)
     units = [derivative_unit(unit, power) if power >= 0 else f"{unit}*s^{-power}" for unit in efforts]
@@ -115,7 +115,7 @@ def _momentum(
 ) -> Float[Numbers, "level coordinate time"]:
     masses, gravity = shared
     pose = movable(pose_of(coordinates, pose_type, order).truncate(order))
-    forces = jnp.concatenate([stacked(part) for part in inertia_forces(pose, masses, gravity)], axis=1)[:, :, 1:]
+    forces = jnp.concatenate([stacked(force) for force in inertia_forces(pose, masses, gravity)], axis=1)[:, :, 1:]
     return jnp.swapaxes(forces, 1, 2).reshape(forces.shape[0], -1, forces.shape[-1])
 
 
@@ -124,7 +124,7 @@ def _evaluated(
     masses: Masses, coordinates: Coordinates, *, pose_type: type[Pose], form: Form
 ) -> Float[Numbers, "level coordinate time"]:
     pose = movable(pose_of(coordinates, pose_type, form.order).truncate(form.order))
-    moving, own = jax.tree.map(lambda x: x[..., 1:, :], (pose, masses))  # without the ground
+    moving_poses, body_masses = jax.tree.map(lambda x: x[..., 1:, :], (pose, masses))  # without the ground
 
     def of_body(pose: Any, masses: Any) -> Any:
         pose, masses = jax.tree.map(lambda x: x[..., None, :], (pose, masses))
@@ -138,5 +138,5 @@ def _evaluated(
         linear, angular = jax.vmap(column, out_axes=2)(np.eye(size))
         return slope_values(form, pose, Columns(Jet(tuple(linear)), Jet(tuple(angular))), *masses)
 
-    coordinates_found = jax.vmap(of_body, in_axes=-2, out_axes=1)(moving, own)  # levels, bodies, coordinates, time
-    return coordinates_found.reshape(coordinates_found.shape[0], -1, coordinates_found.shape[-1])
+    values = jax.vmap(of_body, in_axes=-2, out_axes=1)(moving_poses, body_masses)  # levels, bodies, coordinates, time
+    return values.reshape(values.shape[0], -1, values.shape[-1])

@@ -80,8 +80,8 @@ def in_driver_coordinates(
     order = tuple((indices[name].group, indices[name].instance) for name in names)
     pose_type, coordinates = motion.poses
     masses = required_masses(motion.mechanism)
-    lanes, how = (cut(coordinates, 0), motion.time), {"pose_type": pose_type, "order": order, "form": form}
-    values = _evaluated.along((model.system, masses), lanes, **how)
+    lanes, options = (cut(coordinates, 0), motion.time), {"pose_type": pose_type, "order": order, "form": form}
+    values = _evaluated.along((model.system, masses), lanes, **options)
     values = np.where(spoiled(motion.passages, motion.time, form.order), np.nan, values)
     return _of_drivers(motion, values, power)
 
@@ -182,15 +182,17 @@ def followed(system: System, start_pose: Pose, factor: Factor, time: Jet) -> Pos
     order, so that no factorization is differentiated.
     """
 
-    def solved(pose: Any, solution: Any) -> Any:
+    def extended(pose: Any, solution: Any) -> Any:
         return pose.extended(*system.coordinates(solution, pose.shifts))
 
-    def left(pose: Any) -> Any:
+    def remainder(pose: Any) -> Any:
         return system.residual(pose, time.truncate(pose.order)).dense().coefficients[pose.order]
 
-    pose = start_pose.displaced(*system.coordinates(factor.solve(-left(start_pose)), start_pose.shifts))
+    pose = start_pose.displaced(*system.coordinates(factor.solve(-remainder(start_pose)), start_pose.shifts))
     for _ in range(time.order):
-        solution = factor.solve(-left(pose.extended(None, None)))
-        solution = solution - factor.solve(left(solved(pose, solution)))
-        pose = jax.lax.optimization_barrier(solved(pose, solution))  # or XLA computes it again in all that uses it
+        solution = factor.solve(-remainder(pose.extended(None, None)))
+        solution = solution - factor.solve(remainder(extended(pose, solution)))
+        pose = jax.lax.optimization_barrier(
+            extended(pose, solution)
+        )  # without the barrier, XLA computes it again for each use
     return pose

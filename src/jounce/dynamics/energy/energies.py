@@ -225,14 +225,14 @@ def energies_of(
         _check_known(system, order, system.order)
         bodies = tuple(system.mechanism.rigid_bodies)
         coefficients = energy_coefficients(system, order, function)
-        parts = tuple(
+        energies = tuple(
             labeled(system, x[: system.order - order, 1 : 1 + len(bodies)], energy_unit(order), body=bodies)
             for x in coefficients
         )
-        return *parts, bodies, order
+        return *energies, bodies, order
     series = checked_coordinates(system, q, order + 1)
-    parts = energies_of_tree(system, (series,), (), (order, function, *rotors_of(system, drives=drives)))
-    return *parts, system.moving_links, order
+    energies = energies_of_tree(system, (series,), (), (order, function, *rotors_of(system, drives=drives)))
+    return *energies, system.moving_links, order
 
 
 def rotors_of(robot: Robot, *, drives: bool) -> tuple[tuple[int, ...], tuple[int, ...], tuple[tuple[int, int], ...]]:
@@ -287,20 +287,20 @@ def energies_of_tree(
 ) -> tuple[Float[Numbers, "levels body batch"], ...]:
     """Return the Taylor coefficients of the energies of all bodies of a robot, rotors included."""
     frames = body_frames(tree, arrays[0]).without_base()
-    *parts, last = (stacked(part) for part in function(frames, *mass_arrays(tree), order))
+    *terms, final = (stacked(term) for term in function(frames, *mass_arrays(tree), order))
     if leading:  # the bodies that coordinates move, in their order
         rate = differentiated(Jet(tuple(arrays[0])), order + 1)
-        last = last.at[:, np.array(leading)].add(stacked(rate * rate * (0.5 * jnp.asarray(tree.armature)[:, None])))
+        final = final.at[:, np.array(leading)].add(stacked(rate * rate * (0.5 * jnp.asarray(tree.armature)[:, None])))
     if turned:  # the links of balls
         coordinates = Jet(tuple(arrays[0]))
         spin = differentiated(ball_spin(tree, coordinates, coordinates.differentiate()), order)
         rotors = dot(spin, spin) * (0.5 * jnp.asarray(tree.balls.armature)[:, None])
-        last = last.at[:, np.array(turned)].add(stacked(rotors.truncate(len(last) - 1)))
+        final = final.at[:, np.array(turned)].add(stacked(rotors.truncate(len(final) - 1)))
     if lined:  # the bodies that the first coordinates of tendons move
         tendons, columns = (np.array(x) for x in zip(*lined, strict=True))
         energy = stacked(tendon_energy(tree, differentiated(Jet(tuple(arrays[0])), order + 1)))
-        last = last.at[:, columns].add(energy[: len(last), tendons])
-    return *parts, last
+        final = final.at[:, columns].add(energy[: len(final), tendons])
+    return *terms, final
 
 
 def energy_coefficients(motion: Motion, order: int, function: EnergyFunction = body_energy) -> tuple[Energies, ...]:
@@ -313,12 +313,12 @@ def energy_coefficients(motion: Motion, order: int, function: EnergyFunction = b
     """
     pose_type, coordinates = motion.poses
     _check_known(motion, order, len(coordinates["position"]) - 1)
-    how = {"pose_type": pose_type, "order": order, "function": function}
-    return _of_bodies.along(required_masses(motion.mechanism), coordinates, **how)
+    options = {"pose_type": pose_type, "order": order, "function": function}
+    return _of_bodies.along(required_masses(motion.mechanism), coordinates, **options)
 
 
-def _check_known(motion: Motion, order: int, known: int) -> None:
-    if known < order + 1:
+def _check_known(motion: Motion, order: int, order_known: int) -> None:
+    if order_known < order + 1:
         message = f"an energy of order {order} needs a motion solved to order {order + 1}"
         raise MechanismError(message, name="order", value=motion.order)
 
@@ -327,4 +327,4 @@ def _check_known(motion: Motion, order: int, known: int) -> None:
 def _of_bodies(
     masses: Masses, coordinates: Coordinates, *, pose_type: type[Pose], order: int, function: EnergyFunction
 ) -> tuple[Energies, ...]:
-    return tuple(stacked(part) for part in function(pose_of(coordinates, pose_type), *masses, order))
+    return tuple(stacked(term) for term in function(pose_of(coordinates, pose_type), *masses, order))

@@ -32,16 +32,16 @@ class AbstractEnergyOutput(AbstractMotionOutput):
         if name_of_body is not None:
             check_name("moving body", name_of_body, bodies, MechanismError, name="body")
         if all(body.mass is None for name, body in bodies.items() if name_of_body in (None, name)):
-            which = "no body has a mass" if name_of_body is None else "this body has no mass"
-            raise MechanismError(f"{which}, and an energy needs one", name=self.source, value=name_of_body)
+            phrase = "no body has a mass" if name_of_body is None else "this body has no mass"
+            raise MechanismError(f"{phrase}, and an energy needs one", name=self.source, value=name_of_body)
 
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the energy, (levels, 1, time)."""
-        parts = self._of_bodies(motion)
+        energies = self._of_bodies(motion)
         if self.single_body is None:
-            return parts.sum(axis=1, keepdims=True)
+            return energies.sum(axis=1, keepdims=True)
         index = 1 + list(motion.mechanism.bodies).index(self.single_body)  # the ground first
-        return parts[:, index : index + 1]
+        return energies[:, index : index + 1]
 
     @abc.abstractmethod
     def _of_bodies(self, motion: Motion) -> Numbers:

@@ -130,10 +130,10 @@ def terms_about_center(pose: Pose | Frames, mass: Any, center: Any, moments: Any
 def terms_about_origin(pose: Pose | Frames, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
     """Return the terms of `body_energy` about the origin of the frame, as jets: Negrean 2025, equation 105."""
     linear, rates = differentiated(pose.position, order + 1), _rates(pose, order)
-    couplings = (dot(linear, total(r * c for r, c in zip(part, center, strict=True))) * mass for part in rates)
+    couplings = (dot(linear, total(r * c for r, c in zip(rate, center, strict=True))) * mass for rate in rates)
     size = range(len(center))
-    about = [[moments[i][k] + mass * center[i] * center[k] for k in size] for i in size]
-    return dot(linear, linear) * (0.5 * mass), *couplings, *_rotation(*rates, about)
+    second_moments = [[moments[i][k] + mass * center[i] * center[k] for k in size] for i in size]
+    return dot(linear, linear) * (0.5 * mass), *couplings, *_rotation(*rates, second_moments)
 
 
 def _rates(pose: Pose | Frames, order: int) -> tuple[list[Jet], list[Jet]]:
@@ -146,16 +146,16 @@ def _rates(pose: Pose | Frames, order: int) -> tuple[list[Jet], list[Jet]]:
     assert spin is not None  # there are velocities
     spins = [differentiated(spin, j) for j in range(order + 1)]
 
-    def turned(j: int, axis: Jet) -> Jet:
+    def rotated(j: int, axis: Jet) -> Jet:
         """Return ``C(p, j) w^(j) x axis^(p - j)``."""
         arm = differentiated(axis, order - j)
         velocity = cross(spins[j], arm) if len(axes) == 3 else perpendicular(arm) * spins[j]
         return (velocity * float(math.comb(order, j))).truncate(spins[order].order)
 
-    leading = [turned(order, axis) for axis in axes]
+    leading = [rotated(order, axis) for axis in axes]
     if not order:
-        return leading, [part * 0.0 for part in leading]
-    return leading, [total(turned(j, axis) for j in range(order)) for axis in axes]
+        return leading, [rate * 0.0 for rate in leading]
+    return leading, [total(rotated(j, axis) for j in range(order)) for axis in axes]
 
 
 def _rotation(leading: list[Jet], remaining: list[Jet], moments: Any) -> tuple[Jet, Jet, Jet]:

@@ -120,6 +120,6 @@ def _stored(
 ) -> Any:
     coordinates, angles, instants = lanes
     pose, time, count = pose_of(coordinates, pose_type), Jet.variable(instants[None], 1), len(instants)
-    counted = with_turns(groups, angles)
-    parts = [jnp.broadcast_to(g.energy(pose, time).coefficients[0], (g.instances, count)) for g in counted]
-    return jnp.sum(jnp.concatenate([*parts, jnp.zeros((1, count))]), axis=0)
+    groups_with_turns = with_turns(groups, angles)
+    energies = [jnp.broadcast_to(g.energy(pose, time).coefficients[0], (g.instances, count)) for g in groups_with_turns]
+    return jnp.sum(jnp.concatenate([*energies, jnp.zeros((1, count))]), axis=0)

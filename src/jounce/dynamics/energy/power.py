@@ -74,21 +74,21 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
 
     forces = MotionForces.of(motion)
     nothing = np.zeros((forces.levels, len(motion.time)))
-    driven = [(nothing, nothing), *(_driver_power(forces, name) for name in motion.mechanism.drivers)]
+    driver_powers = [(nothing, nothing), *(_driver_power(forces, name) for name in motion.mechanism.drivers)]
     shared = of_one_lane(forces.motion.forces), forces.masses, forces.gravity, forces.model.length
     applied, kinetic, potential, sizes = forces.along(_powers, shared, forces.acting, levels=forces.levels)
     check_finite_values(forces, applied)
-    power, size = np.sum(driven, axis=0)
-    taken, rubbed = np.sum([(nothing, nothing), *_friction_powers(forces)], axis=0)
-    size = size + rubbed
-    terms = {"drivers": power, "forces": applied.sum(axis=1), "friction": taken}
+    power, size = np.sum(driver_powers, axis=0)
+    friction_power, friction_size = np.sum([(nothing, nothing), *_friction_powers(forces)], axis=0)
+    size = size + friction_size
+    terms = {"drivers": power, "forces": applied.sum(axis=1), "friction": friction_power}
     terms |= {"kinetic": kinetic.sum(axis=1), "potential": potential.sum(axis=1)}
-    labeled_terms = {name: labeled(motion, part[: motion.order + 1], "W") for name, part in terms.items()}
-    put_in, gained = (
+    labeled_terms = {name: labeled(motion, term[: motion.order + 1], "W") for name, term in terms.items()}
+    supplied, gained = (
         sum(labeled_terms[name] for name in names)
         for names in (("drivers", "forces", "friction"), ("kinetic", "potential"))
     )
-    residual: Any = put_in - gained
+    residual: Any = supplied - gained
     labeled_terms["residual"] = residual.assign_attrs(units="W")
     labeled_terms["scale"] = labeled(motion, (size + sizes.sum(axis=1))[: motion.order + 1], "W")
     return xarray.Dataset(labeled_terms)
@@ -138,15 +138,15 @@ def _powers(
     mass, center, moments = masses
     velocity, spin, tensor = pose.point(center).differentiate(), _spin(pose), _inertia(moments, pose.turns)
     axes = [axis.dense() for axis in (pose.axes if pose.turns == 3 else (pose.sine[None], pose.cosine[None]))]
-    turning = _largest(axes).differentiate()
-    speed = _largest([pose.position.differentiate()]) + turning * (jnp.max(jnp.abs(center), axis=0) + FAINT * length)
+    turn_rate = _largest(axes).differentiate()
+    speed = _largest([pose.position.differentiate()]) + turn_rate * (jnp.max(jnp.abs(center), axis=0) + FAINT * length)
     momentum = [total(tensor[i][k] * spin[k] for k in range(pose.turns)) for i in range(pose.turns)]
     kinetic = dot(velocity, velocity) * (0.5 * mass) + total(a * b for a, b in zip(spin, momentum, strict=True)) * 0.5
-    turns = _largest([w[None] for w in spin]) + turning * FAINT
+    turns = _largest([w[None] for w in spin]) + turn_rate * FAINT
     sizes = speed * speed * mass + turns * turns * jnp.max(jnp.sum(jnp.abs(tensor), axis=1), axis=0)
     sizes = sizes.differentiate() + (speed * mass * jnp.sum(jnp.abs(gravity))).truncate(levels - 1)
     potential = (dot(velocity, gravity) * -mass).truncate(levels - 1)
-    applied = [_applied(group, pose, time, turning.map(lambda c: jnp.max(c, axis=0)), length) for group in groups]
+    applied = [_applied(group, pose, time, turn_rate.map(lambda c: jnp.max(c, axis=0)), length) for group in groups]
     nothing = jnp.zeros((levels, 0, len(instants)))
     powers, products = (
         jnp.concatenate([*(stacked(pair[k].truncate(levels - 1)) for pair in applied), nothing], axis=1) for k in (0, 1)

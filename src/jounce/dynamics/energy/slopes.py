@@ -113,7 +113,7 @@ def column_of(pose: Any, change: Any, center: Any, order: int) -> tuple[Any, Any
     linear = change.point(center).truncate(order)
     if isinstance(pose, PlanarPose):
         return stacked(linear), stacked(change.angle.truncate(order)[None])
-    turns = (cross(axis.truncate(order), moved) for axis, moved in zip(pose.axes, change.axes, strict=True))
+    turns = (cross(axis.truncate(order), axis_change) for axis, axis_change in zip(pose.axes, change.axes, strict=True))
     return stacked(linear), stacked(total(turns) * 0.5)
 
 
@@ -140,8 +140,8 @@ def slope_values(
     """
     points = pose.point(center).dense().coefficients
     axes = zip(*(axis.dense().coefficients for axis in axes_of(pose)), strict=True)
-    products = _Products([jnp.stack(parts, axis=1) for parts in axes], moments)
-    linear, angular = (part.dense().coefficients for part in columns)
+    products = _Products([jnp.stack(components_, axis=1) for components_ in axes], moments)
+    linear, angular = (column.dense().coefficients for column in columns)
     values = []
     for level, row in enumerate(form.weights):
         sums = [jnp.zeros((linear[0].shape[1], linear[0].shape[-1]))]

@@ -175,24 +175,24 @@ class Equations(Module):
         """
         shifts = self.pose_type.shifts
         # built once, so that common subexpressions are the same objects and are evaluated once
-        at_rest = self.pose_at_rest(state.position, state.attitude)
-        moving = self.extended(at_rest, state.velocity, state.spin)
-        pose = self.extended(moving, acceleration[:shifts] / 2.0, acceleration[shifts:] / 2.0)
+        rest_pose = self.pose_at_rest(state.position, state.attitude)
+        moving_pose = self.extended(rest_pose, state.velocity, state.spin)
+        pose = self.extended(moving_pose, acceleration[:shifts] / 2.0, acceleration[shifts:] / 2.0)
         clock = Jet.variable(time, 2)
         second = 2.0 * self.system.residual(pose, clock).dense().coefficients[2]
         force, moment = inertia_forces(pose, self.masses, self.gravity)
         inertia = jnp.concatenate([force.coefficients[0], moment.coefficients[0]])[:, 1:]
-        now = clock.truncate(0)
-        friction = FreeFriction(self.system, moving, now)
+        instant = clock.truncate(0)
+        friction = FreeFriction(self.system, moving_pose, instant)
 
         def loosened(change: Any) -> Any:
-            return [self.system.variation(at_rest, change, now).coefficients[0], *friction.slips(change)]
+            return [self.system.variation(rest_pose, change, instant).coefficients[0], *friction.slips(change)]
 
         weights = [multipliers]
         if friction.groups:
             weights += friction.resisting(friction.normal_forces(multipliers))
-        forces = inertia / self.scale + conjugate(loosened, at_rest, weights)[:, 1:]
-        applied = self.system.applied_forces(moving, clock.truncate(1)).coefficients[0]
+        forces = inertia / self.scale + conjugate(loosened, rest_pose, weights)[:, 1:]
+        applied = self.system.applied_forces(moving_pose, clock.truncate(1)).coefficients[0]
         forces = forces - applied[:, 1:] / self.scale
         return forces, second, self.attitude_rate(state)
 
@@ -261,16 +261,16 @@ class Equations(Module):
         time : array of shape (1, batch)
             The instant, s.
         """
-        solved = partial(self.unknowns, solve)
-        frictionless = solved(forces, second)
+        solution = partial(self.unknowns, solve)
+        frictionless = solution(forces, second)
         if not any(map(has_friction, self.system.groups)):
-            return *frictionless, solved
+            return *frictionless, solution
         friction = FreeFriction(self.system, self.pose(state), Jet([time]))
 
         def felt(normal: Any) -> Any:
             return conjugate(friction.slips, self.pose(state).truncate(0), friction.resisting(normal))[:, 1:]
 
-        return with_friction(solved, frictionless, friction, felt)
+        return with_friction(solution, frictionless, friction, felt)
 
     def least_change(self, factor: Factor, gap: Rows) -> Column:
         """Return the scaled change of coordinates, of least kinetic energy, that closes a gap of the scaled rows."""
@@ -352,38 +352,38 @@ def expand(
         Whether JAX can differentiate the result in reverse mode.
     """
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
-    known = inverted(equations.factored(state, time)) if inverse is None else inverse
+    known_inverse = inverted(equations.factored(state, time)) if inverse is None else inverse
 
     def program(*leaves: Any) -> Any:
         return _balance(equations, State(*leaves[:4]), *leaves[4:])
 
     trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((len(equations.system.row_scale), lanes))
     forces, second, _ = program(*state, *trial, time)
-    acceleration, multipliers, solved = equations.begun(known.solve, state, time, forces, second)
+    acceleration, multipliers, solution = equations.begun(known_inverse.solve, state, time, forces, second)
     recursion = Recursion(program, (*state, acceleration, multipliers, time), order - 1, reversible=reversible)
     shifts = equations.pose_type.shifts
 
-    def raised(before: State, acceleration: Any, attitude_rate: Any, k: Any) -> State:
+    def raised(lower: State, acceleration: Any, attitude_rate: Any, k: Any) -> State:
         """Return the state of order k from the coefficients of order k - 1 of its rates."""
-        rates = State(before.velocity, attitude_rate, acceleration[:shifts], acceleration[shifts:])
+        rates = State(lower.velocity, attitude_rate, acceleration[:shifts], acceleration[shifts:])
         return rates.map(lambda c: c / k)
 
     def level(k: Any, carry: Any) -> Any:
-        history, now, series, rates = carry
+        history, coefficients, series, rates = carry
         ticking = jnp.where(k == 1, jnp.ones_like(time), jnp.zeros_like(time))
-        (forces, second, attitude_rate), newest = recursion.advanced(history, k, (*now, None, None, ticking))
-        acceleration, multipliers = solved(forces, second)
+        (forces, second, attitude_rate), newest = recursion.advanced(history, k, (*coefficients, None, None, ticking))
+        acceleration, multipliers = solution(forces, second)
         newest = recursion.corrected(newest, (None,) * 4 + (acceleration, multipliers, None))
         history = recursion.noted(history, k, newest)
-        now = raised(now, acceleration, attitude_rate, k + 1)
-        put = jax.lax.dynamic_update_index_in_dim
-        series = State(*(put(s, c, k + 1, 0) for s, c in zip(series, now, strict=True)))
-        return history, now, series, put(rates, multipliers, k, 0)
+        coefficients = raised(coefficients, acceleration, attitude_rate, k + 1)
+        update = jax.lax.dynamic_update_index_in_dim
+        series = State(*(update(s, c, k + 1, 0) for s, c in zip(series, coefficients, strict=True)))
+        return history, coefficients, series, update(rates, multipliers, k, 0)
 
-    now = raised(state, acceleration, recursion.outputs[2], 1)
-    series = State(*(padded_series([c, d], order + 1) for c, d in zip(state, now, strict=True)))
+    coefficients = raised(state, acceleration, recursion.outputs[2], 1)
+    series = State(*(padded_series([c, d], order + 1) for c, d in zip(state, coefficients, strict=True)))
     rates = padded_series([multipliers], order)
-    _, _, series, rates = jax.lax.fori_loop(1, order, level, (recursion.history, now, series, rates))
+    _, _, series, rates = jax.lax.fori_loop(1, order, level, (recursion.history, coefficients, series, rates))
     numbers = jnp.arange(1.0, order + 1)[:, None, None, None]
     accelerations = numbers * jnp.concatenate([series.velocity[1:], series.spin[1:]], axis=1)
     return Expansion(series, accelerations, rates)

@@ -60,11 +60,11 @@ class ConsistentStart:
     @cached_property
     def mobility(self) -> str:
         """Degrees of freedom and the bodies that have them, in words."""
-        free = self.jacobian.shape[1] - self.jacobian.rank
-        if not free:
+        freedom = self.jacobian.shape[1] - self.jacobian.rank
+        if not freedom:
             return "no degree of freedom: all motion is prescribed"
-        noun = "degree of freedom" if free == 1 else "degrees of freedom"
-        return f"{free} {noun}: {freely_moving(self.model, self.jacobian.free_directions)}"
+        noun = "degree of freedom" if freedom == 1 else "degrees of freedom"
+        return f"{freedom} {noun}: {freely_moving(self.model, self.jacobian.free_directions)}"
 
 
 def consistent_start(
@@ -95,29 +95,29 @@ def consistent_start(
         If the start is a singular position, or one at which rounding would decide the rates.
     """
     mechanism = chosen(mechanism, instant)
-    model, gravity, state, together = build(mechanism, initial=True), gravity_of(mechanism), None, None
+    model, gravity, state, assembled = build(mechanism, initial=True), gravity_of(mechanism), None, None
     masses = stored_masses(model, mechanism, "the equations of motion")
-    exact = True  # whether the state satisfies the rates of the rows that remain without the initial conditions
+    is_exact = True  # whether the state satisfies the rates of the rows that remain without the initial conditions
     if built is not None:
         built(model)
     if mechanism.initial:
-        whole, coordinates = _assembled(model, instant)
+        full_model, coordinates = _assembled(model, instant)
         model = model.released
-        driven = equations_of(whole, masses, gravity)
-        state = _set_in_motion(driven, whole, coordinates, instant)
-        if whole.system.rank is not None:  # redundant rows may contradict each other by less than is refused
-            _check_rates(whole, state, _facts(driven, state, instant).rates, instant)
-            exact = False
-        system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
+        full_equations = equations_of(full_model, masses, gravity)
+        state = _set_in_motion(full_equations, full_model, coordinates, instant)
+        if full_model.system.rank is not None:  # redundant rows may contradict each other by less than is refused
+            _check_rates(full_model, state, _facts(full_equations, state, instant).rates, instant)
+            is_exact = False
+        system = with_fields(model.system, forces=full_model.system.forces, outputs=full_model.system.outputs)
         model = dataclasses.replace(
-            model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
+            model, guess=coordinates, system=system, prescribed=full_model.prescribed, history=full_model.history
         )
-        together = _without_initial_conditions(model, whole, instant)
-    model, coordinates = together or assemble(model, instant, TOLERANCE, free=True)
+        assembled = _without_initial_conditions(model, full_model, instant)
+    model, coordinates = assembled or assemble(model, instant, TOLERANCE, free=True)
     equations = resident(equations_of(model, masses, gravity))
     if state is None:
         state = _set_in_motion(equations, model, coordinates, instant)
-    elif not exact:
+    elif not is_exact:
         state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
     facts = _facts(equations, state, instant)
     jacobian = _checked_jacobian(equations, model, facts, instant)
@@ -154,20 +154,20 @@ def _assembled(model: Model, instant: float) -> tuple[Model, dict[str, np.ndarra
 
 
 def _without_initial_conditions(
-    model: Model, whole: Model, instant: float
+    model: Model, full_model: Model, instant: float
 ) -> tuple[Model, dict[str, np.ndarray]] | None:
     """Return the model without initial conditions, with the assembled coordinates, as `assemble` does.
 
     The assembled coordinates satisfy the remaining rows, which are independent if all rows were. None if the model
     needs an assembly of its own: its length or rows differ, or rows are redundant.
     """
-    remaining = [k for k, name in enumerate(whole.rows) if not name.startswith("initial.")]
-    alike = model.length == whole.length and model.rows == tuple(whole.rows[k] for k in remaining)
-    if not remaining or not alike or whole.system.rank is not None:
+    remaining = [k for k, name in enumerate(full_model.rows) if not name.startswith("initial.")]
+    is_same_shape = model.length == full_model.length and model.rows == tuple(full_model.rows[k] for k in remaining)
+    if not remaining or not is_same_shape or full_model.system.rank is not None:
         return None
-    model, away = with_reference(model, model.guess, instant, model.prescribed)
-    system = resident(with_fields(model.system, row_scale=np.asarray(whole.system.row_scale)[remaining]))
-    return (dataclasses.replace(model, system=system), model.guess) if away <= SETTLED else None
+    model, deviation = with_reference(model, model.guess, instant, model.prescribed)
+    system = resident(with_fields(model.system, row_scale=np.asarray(full_model.system.row_scale)[remaining]))
+    return (dataclasses.replace(model, system=system), model.guess) if deviation <= SETTLED else None
 
 
 def initial_as_drivers(mechanism: Mechanism) -> Mechanism:
@@ -196,8 +196,8 @@ def with_rates(equations: Equations, state: State, time: Instants) -> State:
 @compiled(narrow=True, brief=True)
 def _with_row_rates(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
     """Return the state with consistent velocities, the rates of the rows at rest, and the rate of the attitude."""
-    moving = _moving(equations, state, time)
-    return moving, _row_rates(equations, state, time), equations.attitude_rate(moving)
+    moving_state = _moving(equations, state, time)
+    return moving_state, _row_rates(equations, state, time), equations.attitude_rate(moving_state)
 
 
 class _Facts(NamedTuple):
@@ -223,9 +223,9 @@ def _facts(equations: Equations, state: State, instant: float) -> _Facts:
 
 
 def _moving(equations: Equations, state: State, time: Instants) -> State:
-    """Return a state with velocities, corrected once: masses that gears weight very differently cost digits."""
+    """Return a state with velocities, corrected once, as masses that gears weight very differently cost digits."""
     factor = equations.factored(state, time)
-    return jax.lax.fori_loop(0, 2, lambda _, moving: equations.with_rates(factor, moving, time), state)
+    return jax.lax.fori_loop(0, 2, lambda _, moving_state: equations.with_rates(factor, moving_state, time), state)
 
 
 def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np.ndarray], instant: float) -> State:
@@ -240,15 +240,15 @@ def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np
         If rounding would decide the velocities.
     """
     start, time = at_rest(model, coordinates), np.array([[instant]])
-    state, rates, turning = jax.tree.map(np.asarray, _with_row_rates(equations, start, time))
+    state, rates, turn_rate = jax.tree.map(np.asarray, _with_row_rates(equations, start, time))
     speeds = np.concatenate([state.velocity / model.length, state.spin])[..., 0]
     size, rate = (float(np.max(np.abs(x), initial=0.0)) for x in (speeds, rates))
     if not (np.isfinite(size) and size > 0 and rate > 0):
         return state
-    away = ROUNDING / rate  # s, at those velocities
-    there = start._replace(position=start.position + away * state.velocity, attitude=start.attitude + away * turning)
-    other = jax.tree.map(np.asarray, _with_row_rates(equations, there, time)[0])
-    change = np.concatenate([(other.velocity - state.velocity) / model.length, other.spin - state.spin])[..., 0]
+    step = ROUNDING / rate  # s, at those velocities
+    nearby = start._replace(position=start.position + step * state.velocity, attitude=start.attitude + step * turn_rate)
+    moved = jax.tree.map(np.asarray, _with_row_rates(equations, nearby, time)[0])
+    change = np.concatenate([(moved.velocity - state.velocity) / model.length, moved.spin - state.spin])[..., 0]
     if np.max(np.abs(change)) <= LARGEST_CHANGE * size:
         return state
     message = (
@@ -283,10 +283,10 @@ def _checked_jacobian(equations: Equations, model: Model, facts: _Facts, instant
     MobilityError
         If the equations of motion are singular.
     """
-    whole, system = facts.matrix, model.system
+    matrix, system = facts.matrix, model.system
     jacobian = HostJacobian.of(system.pattern, facts.entries).scaled(np.asarray(system.row_scale)[:, 0])
     columns = jacobian.shape[1]
-    loose = _undetermined_motions(whole, columns)
+    loose = _undetermined_motions(matrix, columns)
     if len(loose):
         mass, _, moments = map(np.asarray, equations.masses)
         by_body = np.linalg.norm(loose[:, :columns].reshape(len(loose), len(model.bodies), -1), axis=(0, 2))
@@ -301,20 +301,20 @@ def _checked_jacobian(equations: Equations, model: Model, facts: _Facts, instant
         names = freely_moving(model, loose[:, :columns])
         raise MobilityError(f"the equations of motion are singular at t = {instant:g} s: {names}")
     if not _is_solid(equations.masses):
-        _check_energy(model, whole[:columns, :columns], jacobian)
+        _check_energy(model, matrix[:columns, :columns], jacobian)
     return jacobian
 
 
-def _undetermined_motions(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, "direction size"]:
+def _undetermined_motions(matrix: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, "direction size"]:
     """Return the null space of the matrix of the equations; its vectors begin with the `columns` coordinates."""
-    scale, tolerance = even_scale(whole, columns), 1e-3 * RANK_TOLERANCE
-    even = whole * scale * scale[:, None]
+    scale, tolerance = even_scale(matrix, columns), 1e-3 * RANK_TOLERANCE
+    even = matrix * scale * scale[:, None]
     if is_clearly_regular(even, tolerance):
-        return np.zeros((0, len(whole)))
-    small = (sizes := np.linalg.svd(even, compute_uv=False)) <= tolerance * sizes.max()
-    if not small.any():
-        return np.zeros((0, len(whole)))
-    directions = np.linalg.svd(even)[2][small] * scale
+        return np.zeros((0, len(matrix)))
+    is_null = (sizes := np.linalg.svd(even, compute_uv=False)) <= tolerance * sizes.max()
+    if not is_null.any():
+        return np.zeros((0, len(matrix)))
+    directions = np.linalg.svd(even)[2][is_null] * scale
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
@@ -333,18 +333,18 @@ def _check_energy(model: Model, mass: Float[np.ndarray, "column column"], jacobi
     """Raise MechanismError if a free motion has negative kinetic energy."""
     count = len(model.bodies)
     by_body = np.einsum("bibj->bij", mass.reshape(count, -1, count, mass.shape[0] // count))
-    lowest = np.linalg.eigvalsh(by_body)
-    if lowest.min() >= 0 or jacobian.rank == mass.shape[0]:
+    eigenvalues = np.linalg.eigvalsh(by_body)
+    if eigenvalues.min() >= 0 or jacobian.rank == mass.shape[0]:
         return
-    free = jacobian.free_directions
-    if len(free) == mass.shape[0] - jacobian.rank:
-        values, motions = np.linalg.eigh(free @ mass @ free.T)
+    free_directions = jacobian.free_directions
+    if len(free_directions) == mass.shape[0] - jacobian.rank:
+        values, motions = np.linalg.eigh(free_directions @ mass @ free_directions.T)
         if values[0] >= -RANK_TOLERANCE * np.abs(values).max():
             return
-        motion = (motions[:, 0] @ free).reshape(count, -1)
+        motion = (motions[:, 0] @ free_directions).reshape(count, -1)
         energies = np.einsum("bi,bij,bj->b", motion, by_body, motion)
     else:  # too many free directions to list all of them
-        energies = lowest.min(axis=1)
+        energies = eigenvalues.min(axis=1)
     name = model.bodies[int(np.argmin(energies))]
     message = "the body can move so that its kinetic energy is negative; correct its mass and its moments of inertia"
     raise MechanismError(message, name=f"bodies.{name}.inertia")

@@ -38,13 +38,13 @@ def inertia_forces(pose: Pose, masses: Masses, gravity: Gravity | float) -> tupl
     acceleration = pose.point(center).differentiate().differentiate()
     force = (acceleration - gravity) * mass
     if isinstance(pose, PlanarPose):
-        about = moments[0][0] + moments[1][1]
-        moment = pose.angle.differentiate().differentiate() * about + cross(pose.direction(center), force)
+        polar_moment = moments[0][0] + moments[1][1]
+        moment = pose.angle.differentiate().differentiate() * polar_moment + cross(pose.direction(center), force)
         return force, moment[None]
     spread = moments[0][0] + moments[1][1] + moments[2][2]
     spin = pose.angular_velocity
     assert spin is not None  # there are accelerations
-    momentum = spin * spread - total(moments[:, i] * part for i, part in enumerate(components(spin)))
+    momentum = spin * spread - total(moments[:, i] * rate for i, rate in enumerate(components(spin)))
     local = pose.to_body(force)
     return force, momentum.differentiate() + cross(spin, momentum) + cross(center, local)
 
@@ -61,16 +61,16 @@ def mass_matrices(pose: Pose, masses: Masses) -> BodyMatrices:
         (x, y, z), (a, b, c) = (axis.coefficients[0] for axis in pose.axes), components(center)
         levers = [b * z - c * y, c * x - a * z, a * y - b * x]  # center velocity per unit rate about each axis
     moments = masses.moments + mass * center[:, None] * center[None]  # about the origin
-    about = total(moments[i, i] for i in range(len(center)))[None, None]
-    turning = about if len(levers) == 1 else about * jnp.eye(3)[:, :, None, None] - moments
+    trace = total(moments[i, i] for i in range(len(center)))[None, None]
+    rotational = trace if len(levers) == 1 else trace * jnp.eye(3)[:, :, None, None] - moments
     shape = pose.position.shape[1:]
 
     def wide(block: Any) -> Any:
         return jnp.broadcast_to(block, (*block.shape[:2], *shape))
 
-    above = wide(mass * jnp.eye(pose.shifts)[:, :, None, None]), wide(mass * jnp.stack(levers, axis=1))
-    below = jnp.swapaxes(above[1], 0, 1), wide(turning)
-    return jnp.concatenate([jnp.concatenate(above, axis=1), jnp.concatenate(below, axis=1)])
+    upper = wide(mass * jnp.eye(pose.shifts)[:, :, None, None]), wide(mass * jnp.stack(levers, axis=1))
+    lower = jnp.swapaxes(upper[1], 0, 1), wide(rotational)
+    return jnp.concatenate([jnp.concatenate(upper, axis=1), jnp.concatenate(lower, axis=1)])
 
 
 def loads(

@@ -63,11 +63,11 @@ def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinat
         )
     for name in state:
         check_name("moving body", name, mechanism.bodies, MechanismError, name="state")
-    missing = [name for name in mechanism.bodies if name not in state]
-    if missing:
-        raise MechanismError("is missing: a state must contain every moving body", name=f"state.{missing[0]}")
-    read = [_body_state(f"state.{name}", state[name], model.pose_type) for name in mechanism.bodies]
-    orders = {len(body["position"]) - 1: name for body, name in zip(read, mechanism.bodies, strict=True)}
+    missing_bodies = [name for name in mechanism.bodies if name not in state]
+    if missing_bodies:
+        raise MechanismError("is missing: a state must contain every moving body", name=f"state.{missing_bodies[0]}")
+    states = [_body_state(f"state.{name}", state[name], model.pose_type) for name in mechanism.bodies]
+    orders = {len(body["position"]) - 1: name for body, name in zip(states, mechanism.bodies, strict=True)}
     if len(orders) > 1:
         listed = ", ".join(f"'{name}' has {order}" for order, name in sorted(orders.items()))
         raise MechanismError(f"all bodies need derivatives to the same order; {listed}", name="state")
@@ -75,11 +75,11 @@ def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinat
     if order >= HIGHEST_ORDER:
         raise MechanismError(f"derivatives are taken to order {HIGHEST_ORDER - 1}", name="state", value=order)
     coordinates = {}
-    for name in read[0]:
-        whole = np.stack([np.zeros_like(read[0][name]), *(body[name] for body in read)], axis=-1)[..., None]
+    for name in states[0]:
+        derivatives = np.stack([np.zeros_like(states[0][name]), *(body[name] for body in states)], axis=-1)[..., None]
         if name == "quaternion":
-            whole[0, 0, 0] = 1.0
-        coordinates[name] = taylor_coefficients(whole)
+            derivatives[0, 0, 0] = 1.0
+        coordinates[name] = taylor_coefficients(derivatives)
     return coordinates
 
 

@@ -70,25 +70,25 @@ class SaddleFronts(Module):
         owners = _owners(bodies.tolist(), count)
         if not owners:
             return None
-        many = int(np.bincount(owners, minlength=count).max())
-        whole = width + many
-        if FRONT_COST * count * whole * (3 * whole) * (2 * whole) >= size**3:  # no front is smaller in a chain
+        max_owned = int(np.bincount(owners, minlength=count).max())
+        stride = width + max_owned
+        if FRONT_COST * count * stride * (3 * stride) * (2 * stride) >= size**3:  # no front is smaller in a chain
             return None
-        where = np.array(owners, int) * whole + width + _ranks(owners)
-        entries = _meeting(pattern, where, whole)
+        owned = np.array(owners, int) * stride + width + _ranks(owners)
+        entries = _meeting(pattern, owned, stride)
         if max(len(by_body) for by_body in entries) > MOST_NEIGHBORS:
             return None
-        fronts = Fronts.of(_as_pattern(entries, count, whole, width * width * count + pattern.entry_count + 1))
+        fronts = Fronts.of(_as_pattern(entries, count, stride, width * width * count + pattern.entry_count + 1))
         number, height, wide = fronts.shape
-        if FRONT_COST * number * whole * height * wide >= size**3:
+        if FRONT_COST * number * stride * height * wide >= size**3:
             return None
-        row_of = np.zeros(pattern.entry_count + 1, np.int32)
-        row_of[positions] = np.arange(len(bodies))[:, None, None]
-        coordinates = (np.arange(count)[:, None] * whole + np.arange(width)).ravel()
-        at = np.concatenate([coordinates, where]).astype(np.int32)
-        unknowns = np.full(count * whole, size, np.int32)
-        unknowns[at] = np.arange(size)
-        return cls(InversePlan.of(fronts), at, unknowns, row_of[:-1])
+        rows = np.zeros(pattern.entry_count + 1, np.int32)
+        rows[positions] = np.arange(len(bodies))[:, None, None]
+        coordinates = (np.arange(count)[:, None] * stride + np.arange(width)).ravel()
+        unknown_positions = np.concatenate([coordinates, owned]).astype(np.int32)
+        unknowns = np.full(count * stride, size, np.int32)
+        unknowns[unknown_positions] = np.arange(size)
+        return cls(InversePlan.of(fronts), unknown_positions, unknowns, rows[:-1])
 
     def factored(
         self,
@@ -101,8 +101,8 @@ class SaddleFronts(Module):
         masses = masses * (scale[:, None] * scale[None])[:, :, None, None]
         lanes = entries.shape[-1]
         flat = jnp.broadcast_to(masses, (*masses.shape[:-1], lanes)).reshape(-1, lanes)
-        whole = jnp.concatenate([flat, entries * row_scale[self.rows], jnp.ones((1, lanes))])
-        return SaddleFactor(FrontalFactor.of(self.fronts, whole, jnp.ones((self.fronts.row_count, 1))), self)
+        values = jnp.concatenate([flat, entries * row_scale[self.rows], jnp.ones((1, lanes))])
+        return SaddleFactor(FrontalFactor.of(self.fronts, values, jnp.ones((self.fronts.row_count, 1))), self)
 
     def blank(self, lanes: int) -> "SaddleFactor":
         """Return a placeholder for the factors of a batch, as the initial value of a loop."""
@@ -128,11 +128,11 @@ class SaddleFactor(Module):
         """Return the dense inverse matrices."""
         size = len(self.saddle.positions)
 
-        def one(lane: Any) -> Any:
+        def lane_inverse(lane: Any) -> Any:
             arrays = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, lane, 1, x.ndim - 1), self.factor.arrays)
             return SaddleFactor(FrontalFactor(self.factor.fronts, *arrays), self.saddle).solve(jnp.eye(size))
 
-        return jnp.moveaxis(jax.lax.map(one, jnp.arange(self.factor.inverted.shape[-1])), 0, -1)
+        return jnp.moveaxis(jax.lax.map(lane_inverse, jnp.arange(self.factor.inverted.shape[-1])), 0, -1)
 
     def inverted(self) -> "SaddleInverse":
         """Return the inverse for many right-hand sides that arrive one after the other."""
@@ -157,8 +157,8 @@ class SaddleInverse(Module):
         """
         diagonal = jnp.abs(self.inverse.diagonal()[self.saddle.positions])
         forces = diagonal[:columns]
-        largest = jnp.max(forces, axis=0, keepdims=True)
-        return jnp.sqrt(forces * largest), jnp.max(diagonal[columns:], axis=0, initial=0.0)
+        max_force = jnp.max(forces, axis=0, keepdims=True)
+        return jnp.sqrt(forces * max_force), jnp.max(diagonal[columns:], axis=0, initial=0.0)
 
 
 @lru_cache(maxsize=100)
@@ -177,25 +177,25 @@ Meeting = list[dict[int, dict[int, int]]]
 """For each row, the bodies that it touches, and for each their columns with the indices of the entries."""
 
 
-def _meeting(pattern: Pattern, where: Int[np.ndarray, " row"], whole: int) -> Meeting:
+def _meeting(pattern: Pattern, owned: Int[np.ndarray, " row"], stride: int) -> Meeting:
     """Return the rows of the padded matrix; its entries are those of the masses, of the Jacobian, and one.
 
     Parameters
     ----------
     pattern : Pattern
         Pattern of the Jacobian.
-    where : array of int, shape (rows,)
+    owned : array of int, shape (rows,)
         Position of each multiplier and of its row.
-    whole : int
+    stride : int
         Number of columns of a body, with its multipliers.
     """
     width, count = pattern.width, pattern.body_count
     mass = width * width * count
-    entries: Meeting = [{k // whole: {k % whole: mass + pattern.entry_count}} for k in range(count * whole)]
+    entries: Meeting = [{k // stride: {k % stride: mass + pattern.entry_count}} for k in range(count * stride)]
     for body, i in itertools.product(range(count), range(width)):
-        entries[body * whole + i][body] = {j: (i * width + j) * count + body for j in range(width)}
+        entries[body * stride + i][body] = {j: (i * width + j) * count + body for j in range(width)}
     rows = zip(
-        np.asarray(pattern.bodies).tolist(), np.asarray(pattern.entry_indices).tolist(), where.tolist(), strict=True
+        np.asarray(pattern.bodies).tolist(), np.asarray(pattern.entry_indices).tolist(), owned.tolist(), strict=True
     )
     for touched, columns, here in rows:
         entries[here] = {}
@@ -203,15 +203,15 @@ def _meeting(pattern: Pattern, where: Int[np.ndarray, " row"], whole: int) -> Me
             if body < count:
                 entries[here][body] = {i: mass + position for i, position in enumerate(block)}
                 for i, position in enumerate(block):
-                    entries[body * whole + i].setdefault(here // whole, {})[here % whole] = mass + position
+                    entries[body * stride + i].setdefault(here // stride, {})[here % stride] = mass + position
     return entries
 
 
-def _as_pattern(entries: Meeting, count: int, whole: int, nothing: int) -> Pattern:
+def _as_pattern(entries: Meeting, count: int, stride: int, nothing: int) -> Pattern:
     """Return the pattern of the padded matrix; `nothing` is the number of entries."""
     slots = max(map(len, entries))
     bodies = np.full((len(entries), slots), count, np.int32)
-    positions = np.full((len(entries), slots, whole), nothing, np.int32)
+    positions = np.full((len(entries), slots, stride), nothing, np.int32)
     for row, by_body in enumerate(entries):
         for slot, (body, columns) in enumerate(by_body.items()):
             bodies[row, slot] = body
@@ -231,9 +231,9 @@ def _owners(bodies: Sequence[Sequence[int]], count: int) -> list[int]:
 
 def _ranks(owners: Sequence[int]) -> Int[np.ndarray, " row"]:
     """Return for each row the number of earlier rows with the same owner."""
-    seen: dict[int, int] = {}
+    counts: dict[int, int] = {}
     ranks = []
     for owner in owners:
-        ranks.append(seen.get(owner, 0))
-        seen[owner] = ranks[-1] + 1
+        ranks.append(counts.get(owner, 0))
+        counts[owner] = ranks[-1] + 1
     return np.array(ranks, int)

@@ -28,21 +28,21 @@ def saddle_point(mass: MassMatrix, jacobian: Jacobian) -> Float[Numbers, "size s
     """Return the mass matrix bordered by the Jacobian and its transpose."""
     rows, columns, lanes = jacobian.shape
     mass = jnp.broadcast_to(mass, (columns, columns, lanes))
-    above = jnp.concatenate([mass, jnp.swapaxes(jacobian, 0, 1)], axis=1)
-    below = jnp.concatenate([jacobian, jnp.zeros((rows, rows, lanes))], axis=1)
-    return jnp.concatenate([above, below])
+    upper = jnp.concatenate([mass, jnp.swapaxes(jacobian, 0, 1)], axis=1)
+    lower = jnp.concatenate([jacobian, jnp.zeros((rows, rows, lanes))], axis=1)
+    return jnp.concatenate([upper, lower])
 
 
-def even_scale(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, " size"]:
+def even_scale(matrix: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, " size"]:
     """Return the scales of rows and columns of a saddle-point matrix for a test of its rank.
 
     Each coordinate is scaled by its own mass or moment of inertia, and each row of the Jacobian by its norm in scaled
     coordinates, so that a small mass among large ones does not count as zero.
     """
-    mass = np.abs(np.diag(whole))[:columns]
-    scale = np.ones(len(whole))
+    mass = np.abs(np.diag(matrix))[:columns]
+    scale = np.ones(len(matrix))
     scale[:columns] = 1 / np.sqrt(np.where(mass > 0, mass, 1.0))
-    rows = np.linalg.norm(whole[columns:, :columns] * scale[:columns], axis=1)
+    rows = np.linalg.norm(matrix[columns:, :columns] * scale[:columns], axis=1)
     scale[columns:] = 1 / np.where(rows > 0, rows, 1.0)
     return scale
 
@@ -51,8 +51,8 @@ def block_diagonal(blocks: BodyMatrices, scale: Float[Numbers, " coordinate"]) -
     """Return the mass matrix of all bodies, rows and columns scaled, from those of each body."""
     size, _, bodies, lanes = blocks.shape
     blocks = blocks * (scale[:, None] * scale[None])[:, :, None, None]
-    whole = jnp.eye(bodies)[:, None, :, None, None] * jnp.moveaxis(blocks, 2, 0)[:, :, None]
-    return whole.reshape(bodies * size, bodies * size, lanes)
+    matrix = jnp.eye(bodies)[:, None, :, None, None] * jnp.moveaxis(blocks, 2, 0)[:, :, None]
+    return matrix.reshape(bodies * size, bodies * size, lanes)
 
 
 def as_column(forces: ByBody, scale: Float[Numbers, " coordinate"]) -> Column:
@@ -89,8 +89,8 @@ class ReducedFactor(Module):
     def solve(self, right: Float[Numbers, "size batch"]) -> Float[Numbers, "size batch"]:
         """Return the solutions for right-hand sides of all coordinates and rows."""
         columns = len(right) - len(self.basis)
-        below = jnp.sum(self.basis * right[columns:][:, None], axis=0)
-        solution = self.factor.solve(jnp.concatenate([right[:columns], below]))
+        row_values = jnp.sum(self.basis * right[columns:][:, None], axis=0)
+        solution = self.factor.solve(jnp.concatenate([right[:columns], row_values]))
         return jnp.concatenate([solution[:columns], jnp.sum(self.basis * solution[columns:][None], axis=1)])
 
     def inverse(self) -> Float[Numbers, "size size batch"]:
@@ -137,9 +137,9 @@ def multiplied(
     matrix = jnp.pad(matrix, ((0, 0), (0, count * block - size), (0, 0)))
     column = jnp.pad(column, ((0, count * block - size), (0, 0)))
 
-    def added(i: Any, product: Any) -> Any:
+    def with_block(i: Any, product: Any) -> Any:
         a = jax.lax.dynamic_slice_in_dim(matrix, i * block, block, 1)
         b = jax.lax.dynamic_slice_in_dim(column, i * block, block)
         return product + total(a[:, j] * b[j][None] for j in range(block))
 
-    return jax.lax.fori_loop(0, count, added, jnp.zeros((rows, lanes)))
+    return jax.lax.fori_loop(0, count, with_block, jnp.zeros((rows, lanes)))

@@ -77,11 +77,11 @@ def check_unique_pressing(model: Model, system: System) -> None:
         raise UnsupportedError(message, name=f"{names[0]}.friction")
 
 
-def check_no_friction(mechanism: Mechanism, what: str) -> None:
-    """Raise UnsupportedError, with the name of the joint, if a joint has friction and `what` does not support it."""
+def check_no_friction(mechanism: Mechanism, result: str) -> None:
+    """Raise UnsupportedError, with the name of the joint, if a joint has friction and `result` does not support it."""
     for name, joint in mechanism.joints.items():
         if getattr(joint, "friction", None) is not None:
-            message = f"{what} of a mechanism whose joints have friction cannot be computed yet; leave friction out"
+            message = f"{result} of a mechanism whose joints have friction cannot be computed yet; leave friction out"
             raise UnsupportedError(message, name=f"joints.{name}.friction")
 
 
@@ -125,10 +125,10 @@ def resisting(element: Any, poses: Sequence[Pose]) -> Float[Jet, "direction inst
 
 
 def torque_lost(
-    element: Any, own: Float[Jet, "row instance batch"], resisting: Float[Jet, "direction instance batch"]
+    element: Any, multipliers: Float[Jet, "row instance batch"], resisting: Float[Jet, "direction instance batch"]
 ) -> Jet:
     """Return the torque loss of turning gears, (instances, batch), from their multipliers."""
-    return element.friction.lost(element.passed_on(own[0]), resisting[0])
+    return element.friction.lost(element.passed_on(multipliers[0]), resisting[0])
 
 
 class Coupling(Module):
@@ -176,53 +176,53 @@ class Coupling(Module):
             return free - jnp.sum(response * forces[:, None], axis=0)
 
         def matrix(normal: Callable[[Any], Any], multipliers: Any, response: Any) -> Any:
-            along = jax.vmap(lambda column: jax.jvp(normal, (multipliers,), (column,))[1])(response)
-            return jnp.eye(len(response))[..., None] + jnp.swapaxes(along, 0, 1)
+            slopes = jax.vmap(lambda column: jax.jvp(normal, (multipliers,), (column,))[1])(response)
+            return jnp.eye(len(response))[..., None] + jnp.swapaxes(slopes, 0, 1)
 
-        plain, held = jax.closure_convert(normal, free)
-        held = [jax.lax.stop_gradient(x) for x in held]
-        fixed = [jax.lax.stop_gradient(x) for x in (free, response)]
+        pure_normal, extras = jax.closure_convert(normal, free)
+        extras = [jax.lax.stop_gradient(x) for x in extras]
+        inputs = [jax.lax.stop_gradient(x) for x in (free, response)]
 
         def normal_now(multipliers: Any) -> Any:
-            return plain(multipliers, *held)
+            return pure_normal(multipliers, *extras)
 
         def gap_of(normal: Callable[[Any], Any], forces: Any, free: Any, response: Any) -> tuple[Any, Any]:
             """Return the residual of the normal forces, and its negative Jacobian."""
             multipliers = with_friction(forces, free, response)
             return normal(multipliers) - forces, matrix(normal, multipliers, response)
 
-        def is_found(gap: Any, forces: Any, whole: Any) -> Any:
-            first, last, held = (jnp.max(jnp.abs(x), axis=0) for x in (start, forces, fixed[0]))
-            near = jnp.max(jnp.abs(gap), axis=0) <= 1e-9 * (first + last) + ROUNDING * held
-            return near & _is_regular_from_none(whole)
+        def is_solution(gap: Any, forces: Any, jacobian: Any) -> Any:
+            first_size, last_size, extras = (jnp.max(jnp.abs(x), axis=0) for x in (start, forces, inputs[0]))
+            is_small = jnp.max(jnp.abs(gap), axis=0) <= 1e-9 * (first_size + last_size) + ROUNDING * extras
+            return is_small & _is_regular_from_none(jacobian)
 
-        def solved(moving: Any, forces: Any, shares: int) -> Any:
+        def iterated(is_moving: Any, forces: Any, fractions: int) -> Any:
             """Return forces after Newton steps in the lanes that move, as friction grows in a number of shares."""
 
             def improved(carry: Any) -> Any:
-                forces, moving, step = carry
-                share = jnp.minimum(jnp.ceil((step + 1).astype(float) / EACH) / shares, 1.0)
-                gap, whole = gap_of(normal_now, forces, fixed[0], share * fixed[1])
-                change = DenseFactor.of(whole).solve(gap, refined=False)
+                forces, is_moving, step = carry
+                fraction = jnp.minimum(jnp.ceil((step + 1).astype(float) / EACH) / fractions, 1.0)
+                gap, jacobian = gap_of(normal_now, forces, inputs[0], fraction * inputs[1])
+                change = DenseFactor.of(jacobian).solve(gap, refined=False)
                 size = jnp.max(jnp.abs(forces), axis=0)
-                moved = (jnp.max(jnp.abs(change), axis=0) > CLOSE * size) | (share < 1.0)
-                return jnp.where(moving, forces + change, forces), moving & moved, step + 1
+                has_moved = (jnp.max(jnp.abs(change), axis=0) > CLOSE * size) | (fraction < 1.0)
+                return jnp.where(is_moving, forces + change, forces), is_moving & has_moved, step + 1
 
             def unsolved(carry: Any) -> Any:
-                return jnp.any(carry[1]) & (carry[2] < STEPS + EACH * (shares - 1))
+                return jnp.any(carry[1]) & (carry[2] < STEPS + EACH * (fractions - 1))
 
-            return jax.lax.while_loop(unsolved, improved, (forces, moving, jnp.zeros((), jnp.int32)))[0]
+            return jax.lax.while_loop(unsolved, improved, (forces, is_moving, jnp.zeros((), jnp.int32)))[0]
 
-        start = normal_now(fixed[0])
+        start = normal_now(inputs[0])
         # start from no friction, so that joints are pressed on the same side as without friction in the first step
-        forces = solved(jnp.ones(start.shape[-1], bool), jnp.zeros_like(start), 1)
-        gap, whole = gap_of(normal_now, forces, *fixed)
-        lost = ~is_found(gap, forces, whole)
-        forces = jax.lax.stop_gradient(solved(lost, jnp.where(lost, 0.0, forces), RAMP))
-        gap, whole = gap_of(normal, forces, free, response)
-        factor = DenseFactor.of(whole)
-        converged = is_found(*map(jax.lax.stop_gradient, (gap, forces, whole)))
-        forces = jnp.where(converged, forces + factor.solve(gap), jnp.nan)  # the last step carries all derivatives
+        forces = iterated(jnp.ones(start.shape[-1], bool), jnp.zeros_like(start), 1)
+        gap, jacobian = gap_of(normal_now, forces, *inputs)
+        is_lost = ~is_solution(gap, forces, jacobian)
+        forces = jax.lax.stop_gradient(iterated(is_lost, jnp.where(is_lost, 0.0, forces), RAMP))
+        gap, jacobian = gap_of(normal, forces, free, response)
+        factor = DenseFactor.of(jacobian)
+        has_converged = is_solution(*map(jax.lax.stop_gradient, (gap, forces, jacobian)))
+        forces = jnp.where(has_converged, forces + factor.solve(gap), jnp.nan)  # the last step carries all derivatives
         return cls(response, factor), with_friction(forces, free, response), forces
 
     def solved(self, free: Float[Numbers, "row batch"], lower: NormalForces) -> tuple[Any, NormalForces]:
@@ -243,5 +243,5 @@ def _is_regular_from_none(matrix: Float[Numbers, "joint joint batch"]) -> Any:
     """Return whether the determinant of the matrix of normal forces stays positive as friction grows, (batch,)."""
     size, _, lanes = matrix.shape
     unit = jnp.eye(size)[..., None]
-    shares = jnp.concatenate([unit + share * (matrix - unit) for share in SHARES], axis=-1)
-    return (DenseFactor.of(shares).sign().reshape(len(SHARES), lanes) > 0).all(axis=0)
+    matrices = jnp.concatenate([unit + fraction * (matrix - unit) for fraction in SHARES], axis=-1)
+    return (DenseFactor.of(matrices).sign().reshape(len(SHARES), lanes) > 0).all(axis=0)

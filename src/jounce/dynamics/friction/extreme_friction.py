@@ -121,34 +121,34 @@ class ExtremeFriction:
     def _directions_of(self, along: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
         """Return the unit vector of `along` for each joint, or that of `otherwise` where `along` is zero."""
         size = np.sqrt(self._blocks(along**2))[self.joints]
-        others = otherwise / np.sqrt(self._blocks(otherwise**2))[self.joints]
-        largest = size.max(axis=0, initial=0.0)
-        clear = size > 1e-14 * largest
-        return np.where(clear, along / np.where(clear, size, 1.0), others)
+        fallback = otherwise / np.sqrt(self._blocks(otherwise**2))[self.joints]
+        max_size = size.max(axis=0, initial=0.0)
+        clear = size > 1e-14 * max_size
+        return np.where(clear, along / np.where(clear, size, 1.0), fallback)
 
     def _held(self, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the normal forces, their sizes, and the friction, for full friction along given directions."""
         joints, components, lanes = self.pressing.shape
-        most = self.coefficients[self.joints][:, None] * directions
+        full_friction = self.coefficients[self.joints][:, None] * directions
         columns = np.zeros((joints, joints, components, lanes))
-        np.add.at(columns, self.joints, most[:, None, None] * self.changes)
+        np.add.at(columns, self.joints, full_friction[:, None, None] * self.changes)
         columns = columns.reshape(joints, -1, lanes)
         pressing, sizes = in_chunks(lambda k: _pressed(self.pressing[..., k], columns[..., k]), lanes)
         sizes = np.where(sizes <= LOCKED * np.abs(self.pressing).max(axis=(0, 1)), sizes, np.nan)
-        return pressing, sizes, most * sizes[self.joints]
+        return pressing, sizes, full_friction * sizes[self.joints]
 
     def _improved(self, directions: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return improved directions of friction, their contribution, and whether it is proven to be the largest."""
         for _ in range(IMPROVEMENTS):
             gain, sizes, regular = self._gain(directions, along)
-            better = np.where(regular, self._directions_of(gain, directions), directions)
-            turned = np.abs(better - directions).max(axis=0, initial=0.0)
-            if not (turned > 1e-14).any():
+            improved = np.where(regular, self._directions_of(gain, directions), directions)
+            change = np.abs(improved - directions).max(axis=0, initial=0.0)
+            if not (change > 1e-14).any():
                 break
-            directions = better
+            directions = improved
         gain, sizes, regular = self._gain(directions, along)
-        turned = np.abs(self._directions_of(gain, directions) - directions).max(axis=0, initial=0.0)
-        proven = regular & (turned <= ALONG) & self._is_concave(gain, sizes, regular)
+        change = np.abs(self._directions_of(gain, directions) - directions).max(axis=0, initial=0.0)
+        proven = regular & (change <= ALONG) & self._is_concave(gain, sizes, regular)
         return directions, np.sum(along * self._held(directions)[2], axis=0), proven
 
     def _gain(self, directions: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -156,62 +156,62 @@ class ExtremeFriction:
         whether both are regular.
         """
         pressing, sizes, _ = self._held(directions)
-        known = np.isfinite(sizes).all(axis=0)
-        pressing, sizes = np.where(known, pressing, 0.0), np.where(known, sizes, 0.0)
+        is_known = np.isfinite(sizes).all(axis=0)
+        pressing, sizes = np.where(is_known, pressing, 0.0), np.where(is_known, sizes, 0.0)
         slopes = -np.einsum("jcl,djcl->jdl", pressing, self.changes) / np.maximum(sizes, SMALLEST)[:, None]
-        most = self.coefficients[self.joints][:, None] * directions
+        full_friction = self.coefficients[self.joints][:, None] * directions
         unit = np.eye(len(directions))[..., None]
-        matrix = unit - most[:, None] * slopes[self.joints]
-        regular = known & np.isfinite(along).all(axis=0) & np.isfinite(matrix).all(axis=(0, 1))
+        matrix = unit - full_friction[:, None] * slopes[self.joints]
+        regular = is_known & np.isfinite(along).all(axis=0) & np.isfinite(matrix).all(axis=(0, 1))
         matrix, right = np.where(regular, matrix, unit), np.where(regular, along, 0.0)
         return np.linalg.solve(matrix.transpose(2, 1, 0), right.T[..., None])[..., 0].T, sizes, regular
 
     def _is_concave(self, gain: np.ndarray, sizes: np.ndarray, regular: np.ndarray) -> np.ndarray:
         """Return whether the Lagrangian with squared cones is concave, so that a stationary point is the maximum."""
-        least = self.coefficients[:, None] * np.maximum(sizes, SMALLEST)
-        weights = np.where(regular, np.sqrt(self._blocks(gain**2)) / (2 * least), 0.0)
+        cone_size = self.coefficients[:, None] * np.maximum(sizes, SMALLEST)
+        weights = np.where(regular, np.sqrt(self._blocks(gain**2)) / (2 * cone_size), 0.0)
         curved = np.einsum("jl,j,djcl,ejcl->lde", weights, self.coefficients**2, self.changes, self.changes)
-        whole = np.eye(len(self.joints)) * weights[self.joints].T[:, None] - curved
-        fit = np.isfinite(whole).all(axis=(1, 2))
-        lowest = np.linalg.eigvalsh(np.where(fit[:, None, None], whole, 0.0)).min(axis=1, initial=0.0)
-        return fit & (lowest >= -CONCAVE * weights.max(axis=0, initial=0.0))
+        curvature = np.eye(len(self.joints)) * weights[self.joints].T[:, None] - curved
+        fit = np.isfinite(curvature).all(axis=(1, 2))
+        eigenvalue = np.linalg.eigvalsh(np.where(fit[:, None, None], curvature, 0.0)).min(axis=1, initial=0.0)
+        return fit & (eigenvalue >= -CONCAVE * weights.max(axis=0, initial=0.0))
 
     def _searched(self, lane: int, along: np.ndarray, chosen: np.ndarray) -> tuple[float, bool]:
         """Return the largest contribution at an instant by comparing all signs, or by a search from many directions."""
         if not np.isfinite(along).all():
             return np.nan, True
         count = len(self.joints)
-        every = self.signs_only and count <= ALL_SIGNS
-        if every:
+        is_complete = self.signs_only and count <= ALL_SIGNS
+        if is_complete:
             trials = np.array(list(itertools.product((1.0, -1.0), repeat=count))).T
         else:
             random = np.random.default_rng(0).normal(size=(count, STARTS))
             trials = np.concatenate([chosen[:, None], self._directions_of(random, random)], axis=1)
         lanes = np.full(trials.shape[1], lane)
-        many = ExtremeFriction(self.pressing[..., lanes], self.changes[..., lanes], self.joints, self.coefficients)
+        repeated = ExtremeFriction(self.pressing[..., lanes], self.changes[..., lanes], self.joints, self.coefficients)
         wide = np.repeat(along[:, None], len(lanes), axis=1)
-        if not every:
-            trials, _, _ = many._improved(trials, wide)
-        value = np.sum(wide * many._held(trials)[2], axis=0)
+        if not is_complete:
+            trials, _, _ = repeated._improved(trials, wide)
+        value = np.sum(wide * repeated._held(trials)[2], axis=0)
         locked = np.isnan(value)
         if locked.any():
-            value[locked] = many._at_lock(trials, wide)[locked]
+            value[locked] = repeated._at_lock(trials, wide)[locked]
         if (value == np.inf).any():
             return np.inf, True
-        return (np.nan, False) if np.isnan(value).any() else (float(value.max()), every)
+        return (np.nan, False) if np.isnan(value).any() else (float(value.max()), is_complete)
 
     def _at_lock(self, directions: np.ndarray, along: np.ndarray) -> np.ndarray:
         """Return the limit of the contribution as friction grows until it locks: infinite with its sign, or NaN."""
-        share, locked = np.zeros(along.shape[1]), np.ones(along.shape[1])
+        fraction, locked = np.zeros(along.shape[1]), np.ones(along.shape[1])
         value = np.zeros(along.shape[1])
         for _ in range(HALVINGS):
-            middle = (share + locked) / 2
-            now = np.sum(along * self._held(directions * middle)[2], axis=0)
-            fit = np.isfinite(now)
-            share, locked, value = (
-                np.where(fit, middle, share),
+            middle = (fraction + locked) / 2
+            contribution = np.sum(along * self._held(directions * middle)[2], axis=0)
+            fit = np.isfinite(contribution)
+            fraction, locked, value = (
+                np.where(fit, middle, fraction),
                 np.where(fit, locked, middle),
-                np.where(fit, now, value),
+                np.where(fit, contribution, value),
             )
         loads = np.abs(self.pressing).max(axis=(0, 1))
         size = np.abs(along).max(axis=0) * loads

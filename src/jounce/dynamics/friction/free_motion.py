@@ -66,31 +66,31 @@ class FreeFriction:
             bodies = tuple(self._at_rest.take(indices) for indices in group.bodies)
             shape = jax.eval_shape(lambda g=group: g.residual(self.pose.truncate(0), self.time).coefficients[0]).shape
             count = shape[0] * shape[1]
-            own = unscaled[first : first + count].reshape(shape[0], shape[1], -1)
+            values = unscaled[first : first + count].reshape(shape[0], shape[1], -1)
             if self.meshes and has_flanks(group):
-                teeth += [own[0], jnp.abs(own[0])]
+                teeth += [values[0], jnp.abs(values[0])]
             if has_friction(group):
                 normals.append(
-                    self._lost(group, own) if loses_torque(group.element) else self._pressed(group, bodies, own)
+                    self._lost(group, values) if loses_torque(group.element) else self._pressed(group, bodies, values)
                 )
             first += count
         return jnp.concatenate(normals + teeth)
 
-    def _lost(self, group: Group, own: Any) -> Any:
-        return torque_lost(group.element, Jet([own]), self._resisting(group)).coefficients[0]
+    def _lost(self, group: Group, multipliers: Any) -> Any:
+        return torque_lost(group.element, Jet([multipliers]), self._resisting(group)).coefficients[0]
 
     def _resisting(self, group: Group) -> Jet:
         return resisting(group.element, [movable(self.pose.take(indices)) for indices in group.bodies])
 
-    def _pressed(self, group: Group, bodies: tuple[Pose, ...], own: Any) -> Any:
+    def _pressed(self, group: Group, bodies: tuple[Pose, ...], multipliers: Any) -> Any:
         body = bodies[1]
-        still = jnp.zeros((body.turns, *body.position.shape[1:]))
+        no_turn = jnp.zeros((body.turns, *body.position.shape[1:]))
 
-        def moved(shift: Any) -> Any:
-            change = movable(body.varied(Jet([shift]), Jet([still])))
+        def displaced(shift: Any) -> Any:
+            change = movable(body.varied(Jet([shift]), Jet([no_turn])))
             return with_rows(group.element.variation(bodies, (None, change), self.time)).coefficients[0]
 
-        force = -jax.linear_transpose(moved, jax.ShapeDtypeStruct(body.position.shape, jnp.float64))(own)[0]
+        force = -jax.linear_transpose(displaced, jax.ShapeDtypeStruct(body.position.shape, jnp.float64))(multipliers)[0]
         return pressed(group.element, bodies, Jet([force])).coefficients[0]
 
     def slips(self, change: Pose) -> list[Any]:
@@ -100,17 +100,17 @@ class FreeFriction:
         """
         slips = []
         for group in self.groups:
-            bodies, changes = ([p.take(its) for its in group.bodies] for p in (self._at_rest, change))
+            bodies, changes = ([p.take(indices) for indices in group.bodies] for p in (self._at_rest, change))
             slips.append(group.element.slip(tuple(bodies), displacements(bodies, changes)).coefficients[0])
         return slips + [self._parted(group, change) for group in self.meshes]
 
     def _parted(self, group: Group, change: Pose) -> Any:
         """Return the displacements conjugate to the parts of a tooth force that follow the multiplier and its size."""
-        of_residual, one, other = (
-            each.variation(self._at_rest, change, self.time).coefficients[0]
-            for each in (group, with_field(group, "flank", 1.0), with_field(group, "flank", -1.0))
+        of_residual, on_left, on_right = (
+            flanked.variation(self._at_rest, change, self.time).coefficients[0]
+            for flanked in (group, with_field(group, "flank", 1.0), with_field(group, "flank", -1.0))
         )
-        return jnp.concatenate([(one + other) / 2.0 - of_residual, (one - other) / 2.0])
+        return jnp.concatenate([(on_left + on_right) / 2.0 - of_residual, (on_left - on_right) / 2.0])
 
     def resisting(self, normal: Float[Numbers, "joint batch"]) -> list[Any]:
         """Return the friction forces of each group, conjugate to `slips`, for normal forces of all joints."""
@@ -127,7 +127,7 @@ class FreeFriction:
 
 def with_friction(
     unknowns: Callable[[Any, Any], tuple[Any, Any]],
-    free: tuple[Any, Any],
+    frictionless: tuple[Any, Any],
     friction: FreeFriction,
     felt: Callable[[Any], Any],
 ) -> tuple[Any, Any, Callable[[Any, Any], tuple[Any, Any]]]:
@@ -137,25 +137,25 @@ def with_friction(
     ----------
     unknowns : callable
         Solver of the frictionless equations for the residuals of `Equations.balance`.
-    free : tuple of array
+    frictionless : tuple of array
         Accelerations and multipliers without friction.
     friction : FreeFriction
         Friction of the mechanism.
     felt : callable
         Function from normal forces to generalized forces on the bodies, as in `Equations.balance`.
     """
-    acceleration, multipliers = free
+    acceleration, multipliers = frictionless
     count, lanes = friction.count, multipliers.shape[-1]
     unit = jnp.broadcast_to(jnp.eye(count)[..., None], (count, count, lanes))
-    moved, held = jax.vmap(lambda forces: unknowns(felt(forces), jnp.zeros_like(multipliers)))(unit)
-    coupling, multipliers, normal = Coupling.of(friction.normal_forces, multipliers, -held)
-    acceleration = acceleration + _along(moved, normal)
+    accelerations, responses = jax.vmap(lambda forces: unknowns(felt(forces), jnp.zeros_like(multipliers)))(unit)
+    coupling, multipliers, normal = Coupling.of(friction.normal_forces, multipliers, -responses)
+    acceleration = acceleration + _along(accelerations, normal)
 
     def solved(forces: Any, second: Any) -> tuple[Any, Any]:
-        bare, missing = unknowns(forces, second)
-        pressing = jax.jvp(friction.normal_forces, (multipliers,), (missing,))[1]
-        missing, normal = coupling.solved(missing, pressing)
-        return bare + _along(moved, normal), missing
+        unrubbed, change = unknowns(forces, second)
+        pressing = jax.jvp(friction.normal_forces, (multipliers,), (change,))[1]
+        change, normal = coupling.solved(change, pressing)
+        return unrubbed + _along(accelerations, normal), change
 
     return acceleration, multipliers, solved
 

@@ -120,12 +120,12 @@ def constraint_equations(
     import xarray
 
     if isinstance(motion, Mechanism) or state is not None:
-        motion, known = at_state(motion, state, 0.0 if time is None else time)
-        order = known + 1
+        motion, known_order = at_state(motion, state, 0.0 if time is None else time)
+        order = known_order + 1
     elif time is not None:
         raise MechanismError("goes with a state; a motion has its instants", name="time", value=time)
     elif isinstance(motion, Motion):
-        order = known = motion.order
+        order = known_order = motion.order
     else:
         raise MechanismError("must be a jn.Motion, or a jn.Mechanism with a state", name="motion", value=motion)
     labels = {"time": motion.time} | equation_labels(motion.mechanism, motion.model)
@@ -136,18 +136,18 @@ def constraint_equations(
         "residual": (("time", "row"), numbers["residual"]),
         "jacobian": (("time", "row", "column"), numbers["jacobian"]),
         "right_side": (("time", "derivative", "row"), numbers["right_side"], 1),
-        "velocities": (("time", "derivative", "column"), _velocities(motion, known), 1),
+        "velocities": (("time", "derivative", "column"), _velocities(motion, known_order), 1),
     }
     variables |= _positions(motion) | _forces(motion, numbers["jacobian"])
     solved = motion.status == Status.OK
-    parts = []
+    arrays = []
     for name, (dims, values, *first) in variables.items():
         coordinates = {dim: labels[dim] for dim in dims if dim != "derivative"}
         if first:
             coordinates["derivative"] = np.arange(first[0], first[0] + values.shape[1])
         values = np.where(solved.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan)
-        parts.append(xarray.DataArray(values, coordinates, dims, name))
-    dataset = cast("xarray.Dataset", xarray.merge(parts, join="outer", compat="no_conflicts"))  # not a DataTree
+        arrays.append(xarray.DataArray(values, coordinates, dims, name))
+    dataset = cast("xarray.Dataset", xarray.merge(arrays, join="outer", compat="no_conflicts"))  # not a DataTree
     dataset.attrs = {"title": motion.mechanism.title or "equations of a mechanism", "source": "jounce"}
     dataset["time"].attrs = {"units": "s", "long_name": "time"}
     dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
@@ -189,19 +189,19 @@ def in_si_units(model: Model) -> System:
     """Return the constraints of a model without forces, rows and columns unscaled."""
     system = model.system
     count = model.pose_type.shifts + model.pose_type.turns
-    ones = np.ones((system.shape[0], 1)), np.ones(count)
-    return dataclasses.replace(system, outputs=(), forces=(), row_scale=ones[0], column_scale=ones[1])
+    unit_scales = np.ones((system.shape[0], 1)), np.ones(count)
+    return dataclasses.replace(system, outputs=(), forces=(), row_scale=unit_scales[0], column_scale=unit_scales[1])
 
 
 def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
     """Return residual, Jacobian and right-hand sides at all instants, the time first."""
     pose_type, coordinates = motion.poses
-    plain = in_si_units(motion.model)
+    unscaled = in_si_units(motion.model)
 
-    residual, jacobian = _position_equations.along(plain, (cut(coordinates, 0), motion.time), pose_type=pose_type)
+    residual, jacobian = _position_equations.along(unscaled, (cut(coordinates, 0), motion.time), pose_type=pose_type)
     right_side = np.zeros((0, *residual.shape))
     if order:
-        right_side = _right_sides.along(plain, (coordinates, motion.time), pose_type=pose_type, order=order)
+        right_side = _right_sides.along(unscaled, (coordinates, motion.time), pose_type=pose_type, order=order)
     chosen = row_order(motion.mechanism, motion.model)
     return {
         "residual": residual[chosen].T,
@@ -217,9 +217,9 @@ def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
         first = name == "angular_velocity"  # its coefficients begin with the rate
         levels = list(values[: order + 1 - first])
         levels += [jnp.zeros(values.shape[1:])] * (order + 1 - first - len(levels))
-        unknown = name != "quaternion"  # the attitude follows from its value and the angular velocity
+        is_unknown = name != "quaternion"  # the attitude follows from its value and the angular velocity
         copies = [
-            [jnp.zeros_like(level) if unknown and k + first == copy else level for copy in range(1, order + 1)]
+            [jnp.zeros_like(level) if is_unknown and k + first == copy else level for copy in range(1, order + 1)]
             for k, level in enumerate(levels)
         ]
         elements[name] = jnp.stack([jnp.concatenate(copy, axis=-1) for copy in copies])
@@ -251,9 +251,9 @@ def right_sides(
     """
     order = len(bodies["position"]) - 1
     residual = system.residual(pose_of(bodies, pose_type, order), Jet.variable(instants[None], order)).dense()
-    parts = [c.reshape(len(c), order, c.shape[-1] // order)[:, k] for k, c in enumerate(residual.coefficients[1:])]
+    levels = [c.reshape(len(c), order, c.shape[-1] // order)[:, k] for k, c in enumerate(residual.coefficients[1:])]
     factorials = np.array([math.factorial(k + 1) for k in range(order)], float)
-    return -factorials[:, None, None] * jnp.stack(parts)
+    return -factorials[:, None, None] * jnp.stack(levels)
 
 
 @Mapped
@@ -267,12 +267,12 @@ def _right_sides(
 def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivative column"]:
     """Return the derivatives of the coordinates, beginning with the first."""
     _, coordinates = motion.poses
-    moving = {name: np.asarray(values)[..., 1:, :] for name, values in coordinates.items()}  # without the ground
-    plain = {name: plain_derivatives(values) for name, values in moving.items()}
-    turns = plain["angle"][1:, None] if "angle" in plain else plain["angular_velocity"]
-    parts = np.concatenate([plain["position"][1 : order + 1], turns[:order]], axis=1)
+    moving_bodies = {name: np.asarray(values)[..., 1:, :] for name, values in coordinates.items()}  # without the ground
+    derivatives = {name: plain_derivatives(values) for name, values in moving_bodies.items()}
+    turns = derivatives["angle"][1:, None] if "angle" in derivatives else derivatives["angular_velocity"]
+    columns_ = np.concatenate([derivatives["position"][1 : order + 1], turns[:order]], axis=1)
     columns = motion.model.system.shape[1]
-    return np.transpose(parts, (3, 0, 2, 1)).reshape(len(motion.time), order, columns)
+    return np.transpose(columns_, (3, 0, 2, 1)).reshape(len(motion.time), order, columns)
 
 
 def _positions(motion: Motion) -> dict[str, Any]:
@@ -302,10 +302,12 @@ def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> d
         or (isinstance(motion, MotionAtState) and not _determined(motion, jacobian[0], mass[0]))
     ):
         return forces
-    solved = MotionForces.of(motion)
-    if solved.flanks:  # not in the equations: the radial force between teeth does no work
-        solved = MotionForces(motion, flanks=False)
-    values = derivatives_along(motion, solved.unique_multipliers[:levels][:, row_order(motion.mechanism, motion.model)])
+    motion_forces = MotionForces.of(motion)
+    if motion_forces.flanks:  # not in the equations: the radial force between teeth does no work
+        motion_forces = MotionForces(motion, flanks=False)
+    values = derivatives_along(
+        motion, motion_forces.unique_multipliers[:levels][:, row_order(motion.mechanism, motion.model)]
+    )
     return forces | {"multipliers": (("time", "derivative", "row"), values, 0)}
 
 
@@ -315,14 +317,14 @@ def _determined(
     """Return whether the equations determine the multipliers at a state; for a motion they always do."""
     scale = np.tile(motion.model.system.column_scale, len(motion.mechanism.bodies))
     sizes = np.max(np.abs(jacobian * scale), axis=1, keepdims=True)
-    whole = jacobian * scale / np.where(sizes > 0, sizes, 1.0)
-    if len(whole) != whole.shape[1]:
+    matrix = jacobian * scale / np.where(sizes > 0, sizes, 1.0)
+    if len(matrix) != matrix.shape[1]:
         mass = mass * scale[:, None] * scale
         mass = mass / (np.max(np.abs(mass)) or 1.0)
-        whole = np.asarray(saddle_point(mass[..., None], whole[..., None]))[..., 0]
-        even = even_scale(whole, len(scale))
-        whole = whole * even * even[:, None]
-    return int(np.linalg.matrix_rank(whole, rtol=RANK_TOLERANCE)) == len(whole)
+        matrix = np.asarray(saddle_point(mass[..., None], matrix[..., None]))[..., 0]
+        even = even_scale(matrix, len(scale))
+        matrix = matrix * even * even[:, None]
+    return int(np.linalg.matrix_rank(matrix, rtol=RANK_TOLERANCE)) == len(matrix)
 
 
 def _mass_matrix(motion: Motion) -> Float[np.ndarray, "time column column"]:
@@ -342,9 +344,9 @@ def _body_masses(masses: Masses, bodies: Coordinates, *, pose_type: type[Pose]) 
 def _check_finite(numbers: dict[str, np.ndarray], rows: np.ndarray, instant: float) -> None:
     """Raise MechanismError if a row is not finite at a state."""
     for name, values in numbers.items() if len(rows) else ():
-        bad = ~np.isfinite(np.moveaxis(values[0], -1 if name == "right_side" else 0, 0).reshape(len(rows), -1))
-        if bad.any():
-            row, k = np.argwhere(bad)[0]
-            what = f"its derivative {k + 1}" if name == "right_side" else f"its {name}"
-            message = f"{what} has no finite value at t = {instant:g} s; check its law and its points there"
+        is_bad = ~np.isfinite(np.moveaxis(values[0], -1 if name == "right_side" else 0, 0).reshape(len(rows), -1))
+        if is_bad.any():
+            row, k = np.argwhere(is_bad)[0]
+            phrase = f"its derivative {k + 1}" if name == "right_side" else f"its {name}"
+            message = f"{phrase} has no finite value at t = {instant:g} s; check its law and its points there"
             raise MechanismError(message, name=str(rows[row]).rpartition(".")[0])

@@ -46,7 +46,7 @@ def work_along(
     slope: Slope,
     forces: Sequence[Float[Numbers, "row instance batch"]] | Multipliers,
     level: int,
-    lowest: int = 0,
+    lowest_level: int = 0,
 ) -> Float[Numbers, "coordinate instance batch"]:
     """Return the Taylor coefficient of the generalized forces of multipliers: the product of slope and multipliers.
 
@@ -58,10 +58,10 @@ def work_along(
         Coefficients of the multipliers.
     level : int
         Index of the coefficient of the product.
-    lowest : int
+    lowest_level : int
         Index of the first coefficient of the slope that is included.
     """
-    return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
+    return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest_level, level + 1))
 
 
 def balancing(mass: MassMatrix | None, jacobian: Jacobian) -> Callable[[Column], Float[Numbers, "row batch"]]:
@@ -104,14 +104,14 @@ def multipliers(
 
     def level(latest: Any, level_and_load: Any) -> tuple[Any, Any]:
         """Return the coefficients with the next one: the latest first, zeros before the lowest."""
-        k, missing = level_and_load
-        for group, parts, forces in by_group(system, blocks, latest):
-            for slot, slope in zip(group.moving_slots, parts, strict=True):
+        k, deficit = level_and_load
+        for group, slopes, forces in by_group(system, blocks, latest):
+            for slot, slope in zip(group.moving_slots, slopes, strict=True):
                 # coefficients that order k does not need may not be finite
-                needed = [jnp.where(j <= k, slope[j], 0.0) for j in range(1, count)]
-                work = total(jnp.sum(c * f[None], axis=1) for c, f in zip(needed, forces, strict=True))
-                missing -= onto_bodies(work, group.bodies[slot], system.body_count)
-        newest = solve(missing)
+                lower = [jnp.where(j <= k, slope[j], 0.0) for j in range(1, count)]
+                work = total(jnp.sum(c * f[None], axis=1) for c, f in zip(lower, forces, strict=True))
+                deficit -= onto_bodies(work, group.bodies[slot], system.body_count)
+        newest = solve(deficit)
         return [newest, *latest[:-1]][: len(latest)], newest
 
     start = [jnp.zeros((system.shape[0], load.shape[-1]))] * (count - 1)
@@ -135,8 +135,8 @@ def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callab
     jacobian = jacobian_of(system, blocks)
     if mass is None:
         return balancing(None, jacobian)
-    whole = block_diagonal(mass, jnp.asarray(system.column_scale))
-    return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # multipliers do not depend on its scale
+    mass_matrix = block_diagonal(mass, jnp.asarray(system.column_scale))
+    return balancing(mass_matrix / jnp.max(jnp.abs(mass_matrix)), jacobian)  # multipliers do not depend on its scale
 
 
 def _transposed(system: System, entries: Float[Numbers, "entry batch"], rows: Any) -> Any:
@@ -156,7 +156,7 @@ def jacobian_of(system: System, blocks: Slopes) -> Jacobian:
 
 def _entries(system: System, blocks: Slopes) -> Float[Numbers, "entry batch"]:
     scale = jnp.asarray(system.column_scale)[:, None, None, None]
-    return jnp.concatenate([(slope[0] * scale).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts])
+    return jnp.concatenate([(slope[0] * scale).reshape(-1, slope.shape[-1]) for slopes in blocks for slope in slopes])
 
 
 def by_group(system: System, blocks: Slopes, latest: list[Float[Numbers, "row batch"]]) -> list[Any]:
@@ -164,11 +164,11 @@ def by_group(system: System, blocks: Slopes, latest: list[Float[Numbers, "row ba
     if not latest:
         return []
     results, first = [], 0
-    for group, parts in zip(system.groups, blocks, strict=True):
-        _, _, rows, instances, lanes = parts[0].shape
-        last = first + rows * instances
-        results.append((group, parts, [level[first:last].reshape(rows, instances, lanes) for level in latest]))
-        first = last
+    for group, slopes in zip(system.groups, blocks, strict=True):
+        _, _, rows, instances, lanes = slopes[0].shape
+        stop = first + rows * instances
+        results.append((group, slopes, [level[first:stop].reshape(rows, instances, lanes) for level in latest]))
+        first = stop
     return results
 
 

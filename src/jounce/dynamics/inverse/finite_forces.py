@@ -24,11 +24,11 @@ def check_finite_values(forces: Any, values: Numbers, name: str | None = None) -
     """
     if forces.motion.traced:
         return
-    bad = ~np.isfinite(values).all(axis=tuple(range(1, values.ndim - 1))) & (forces.motion.status == Status.OK)
-    if not bad.any():
+    is_bad = ~np.isfinite(values).all(axis=tuple(range(1, values.ndim - 1))) & (forces.motion.status == Status.OK)
+    if not is_bad.any():
         return
-    lane = int(np.argmax(bad.any(axis=0)))
-    level = int(np.argmax(bad[:, lane]))
+    lane = int(np.argmax(is_bad.any(axis=0)))
+    level = int(np.argmax(is_bad[:, lane]))
     if name is None:
         unfit = [
             n
@@ -36,18 +36,18 @@ def check_finite_values(forces: Any, values: Numbers, name: str | None = None) -
             if not np.isfinite(forces.applied_coefficients(n)[: level + 1, :, lane]).all()
         ]
         name = f"forces.{unfit[0]}" if unfit else "joints"
-    at, advice = f"no finite value at t = {forces.motion.time[lane]:g} s", "check its law there"
+    phrase, advice = f"no finite value at t = {forces.motion.time[lane]:g} s", "check its law there"
     if level:
-        raise MechanismError(f"its derivative {level} has {at}; {advice}, or take fewer derivatives", name=name)
-    raise MechanismError(f"has {at}; {advice}", name=name)
+        raise MechanismError(f"its derivative {level} has {phrase}; {advice}, or take fewer derivatives", name=name)
+    raise MechanismError(f"has {phrase}; {advice}", name=name)
 
 
 def check_finite_forces(forces: Any, finite: Any) -> None:
     """Raise MechanismError for the first solved instant at which an applied force is not finite."""
     if forces.motion.traced:
         return
-    bad = np.argwhere((~np.asarray(finite) & (forces.motion.status == Status.OK)).T)
-    if len(bad):
-        lane, force = bad[0]
+    failures = np.argwhere((~np.asarray(finite) & (forces.motion.status == Status.OK)).T)
+    if len(failures):
+        lane, force = failures[0]
         name, instant = force_names(forces.model)[force], forces.motion.time[lane]
         raise MechanismError(f"has no finite value at t = {instant:g} s; check its law", name=f"forces.{name}")

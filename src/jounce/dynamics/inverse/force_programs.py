@@ -105,11 +105,11 @@ def pressing(
     poses, instants, flank, forces = lanes
     if loses_torque(element):
         return element.passed_on(Jet([forces[0]])).coefficients[0][None]
-    placed = [cut(pose, 0) for pose in poses]
+    positions = [cut(pose, 0) for pose in poses]
     wrench = joint_wrench.function(
-        element, (placed, instants, flank, forces[None], None), pose_type=pose_type, slot=slot, levels=1
+        element, (positions, instants, flank, forces[None], None), pose_type=pose_type, slot=slot, levels=1
     )
-    bodies = tuple(pose_of(pose, pose_type, 0) for pose in placed)
+    bodies = tuple(pose_of(pose, pose_type, 0) for pose in positions)
     return pressing_force(element, bodies, Jet([wrench[0, : bodies[0].shifts]])).coefficients[0]
 
 
@@ -120,8 +120,8 @@ def largest_array(model: Model) -> int:
     of redundant rows, and those with masses for free motions.
     """
     rows, columns = model.system.shape
-    few = model.pose_type is SpatialPose and columns <= MOST_COLUMNS
-    return ALL if few and rows == columns and model.system.rank is None else SMALL
+    has_few_columns = model.pose_type is SpatialPose and columns <= MOST_COLUMNS
+    return ALL if has_few_columns and rows == columns and model.system.rank is None else SMALL
 
 
 @Mapped
@@ -153,19 +153,19 @@ def balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, An
     mass = None if square else mass_matrices(pose.truncate(0), masses)[:, :, 1:]
 
     def rubbed(group: Group) -> Rubbed:
-        moving = [pose.truncate(levels).take(indices) for indices in group.bodies]
-        slopes = [friction_slope(group.element, moving, slot) for slot in group.moving_slots]
-        placed = [body.truncate(levels - 1) for body in moving]
-        return slopes, placed, stacked(resisting(group.element, moving)) if loses_torque(group.element) else None
+        moving_poses = [pose.truncate(levels).take(indices) for indices in group.bodies]
+        slopes = [friction_slope(group.element, moving_poses, slot) for slot in group.moving_slots]
+        bodies_ = [body.truncate(levels - 1) for body in moving_poses]
+        return slopes, bodies_, stacked(resisting(group.element, moving_poses)) if loses_torque(group.element) else None
 
     def of_chunk(blocks: Slopes, load: Numbers, mass: Any, rubbed: Sequence[Rubbed]) -> Any:
         if not rubbed:
             return constraint_forces.multipliers(system, blocks, load, mass)
         return with_friction(system, blocks, load, mass, friction_groups(system, blocks, rubbed))
 
-    given = blocks, load, mass, [rubbed(group) for group in system.groups if has_friction(group)]
+    arguments = blocks, load, mass, [rubbed(group) for group in system.groups if has_friction(group)]
     is_dense = mass is not None or system.fronts is None
-    multipliers = in_small_chunks(of_chunk, SMALL_CHUNK, *given) if is_dense else of_chunk(*given)
+    multipliers = in_small_chunks(of_chunk, SMALL_CHUNK, *arguments) if is_dense else of_chunk(*arguments)
     return multipliers[None], finite
 
 
@@ -206,8 +206,8 @@ def exerted(driver: Any, lanes: tuple[Sequence[Coordinates], Lanes, Multipliers]
     """Return the forces of drivers along their prescribed coordinates, as Taylor coefficients."""
     poses, instants, forces = lanes
     order = len(forces) - 1
-    built = [pose_of(pose, pose_type, order) for pose in poses]
-    return constraint_forces.exerted(driver, built, Jet.variable(instants[None], order), forces)
+    poses_ = [pose_of(pose, pose_type, order) for pose in poses]
+    return constraint_forces.exerted(driver, poses_, Jet.variable(instants[None], order), forces)
 
 
 @Mapped
@@ -257,8 +257,8 @@ def joint_wrench(
     wrench = constraint_forces.wrench(slope, forces)
     if rubbed is None:
         return wrench
-    moving, pressing = rubbed
-    slope = friction_slopes.function(element, moving, pose_type=pose_type, slot=slot, levels=levels)
+    rubbing_poses, pressing = rubbed
+    slope = friction_slopes.function(element, rubbing_poses, pose_type=pose_type, slot=slot, levels=levels)
     return wrench + constraint_forces.wrench(slope, pressing)
 
 
@@ -269,14 +269,14 @@ def force_wrench(
     """Return the wrenches of applied forces on the body in a slot, as `joint_wrench` does."""
     acting, instants, sizes = lanes
     element, poses, time = force_at(force, (acting, instants), pose_type, levels - 1)
-    built = tuple(map(movable, poses))
-    unchanged = [jax.tree.map(jnp.zeros_like, pose) for pose in built]
+    movables = tuple(map(movable, poses))
+    unchanged = [jax.tree.map(jnp.zeros_like, pose) for pose in movables]
 
     def displaced(change: Any) -> Any:
         changes = (*unchanged[:slot], change, *unchanged[slot + 1 :])
-        return stacked(with_rows(element.variation(built, changes, time)))
+        return stacked(with_rows(element.variation(movables, changes, time)))
 
-    return constraint_forces.wrench(along_displacements(built[slot], displaced), -sizes)  # opposite to a multiplier
+    return constraint_forces.wrench(along_displacements(movables[slot], displaced), -sizes)  # opposite to a multiplier
 
 
 @Mapped
@@ -291,7 +291,7 @@ def transmitted_wrench(
     order, wrenches = len(works[0]) - 1, []
     for work, body in zip(works, bodies, strict=True):
         pose = pose_of(body, pose_type, order)
-        force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))
+        force, moment = (Jet(tuple(x[:, :, None])) for x in (work[:, : pose.shifts], work[:, pose.shifts :]))
         lever = cross(pose.position - point, force)
         moment = moment + lever[None] if pose.turns == 1 else pose.direction(moment) + lever
         wrenches.append(jnp.concatenate([stacked(force), stacked(moment)], axis=1)[:, :, 0])
@@ -309,12 +309,12 @@ def expressed(
     work, bodies = lanes
     order = len(work) - 1
     pose, *frame = (pose_of(body, pose_type, order) for body in bodies)
-    force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))
+    force, moment = (Jet(tuple(x[:, :, None])) for x in (work[:, : pose.shifts], work[:, pose.shifts :]))
     if pose.turns == 1:
         moment = moment - cross(pose.direction(point), force)[None]
     else:
         moment = pose.direction(moment - cross(point, pose.to_body(force)))
-    for other in frame:
-        force = other.to_body(force)
-        moment = moment if pose.turns == 1 else other.to_body(moment)
+    for target in frame:
+        force = target.to_body(force)
+        moment = moment if pose.turns == 1 else target.to_body(moment)
     return stacked(force)[:, :, 0], stacked(moment)[:, :, 0]

@@ -93,45 +93,45 @@ def with_friction(
     """
     solve, rows, levels = load_solver(system, blocks, mass), system.shape[0], len(load)
     felt = [_felt(slopes, group) for group, slopes in zip(system.groups, blocks, strict=True)]
-    resisted = [_felt(its.friction, its.group) for its in rubbing]
-    joints = [its.group.instances for its in rubbing]
+    resisted = [_felt(joint.friction, joint.group) for joint in rubbing]
+    joints = [joint.group.instances for joint in rubbing]
 
-    def on_bodies(level: Callable[[Slope, Any], Any], parts: Sequence[Any], forces: Any) -> Any:
+    def on_bodies(level: Callable[[Slope, Any], Any], all_slopes: Sequence[Any], forces: Any) -> Any:
         """Return the generalized forces of all rows on the bodies; `level` multiplies a slope by the forces."""
-        done, first = 0.0, 0
-        for by_slot in parts:
+        work, first = 0.0, 0
+        for by_slot in all_slopes:
             _, _, count, instances, lanes = by_slot[0][0].shape
-            its = forces[..., first : first + count * instances, :]
-            its = its.reshape(*its.shape[:-2], count, instances, lanes)
+            joint = forces[..., first : first + count * instances, :]
+            joint = joint.reshape(*joint.shape[:-2], count, instances, lanes)
             for slope, bodies in by_slot:
-                done = done + onto_bodies(level(slope, its), bodies, system.body_count)
+                work = work + onto_bodies(level(slope, joint), bodies, system.body_count)
             first += count * instances
-        return done
+        return work
 
-    def now(slope: Slope, forces: Any) -> Any:
+    def leading_term(slope: Slope, forces: Any) -> Any:
         return jnp.sum(slope[0] * forces[None], axis=1)
 
     def normal(multipliers: Any) -> Any:
-        return jnp.concatenate([its.normal_forces([multipliers])[0] for its in rubbing])
+        return jnp.concatenate([joint.normal_forces([multipliers])[0] for joint in rubbing])
 
     unit = jnp.broadcast_to(jnp.eye(sum(joints))[..., None], (sum(joints), sum(joints), load.shape[-1]))
-    response = jax.vmap(lambda forces: solve(on_bodies(now, resisted, forces)))(unit)
+    response = jax.vmap(lambda forces: solve(on_bodies(leading_term, resisted, forces)))(unit)
     coupling, multipliers, forces = Coupling.of(normal, solve(load[0]), response)
     if levels == 1:
         return jnp.concatenate([multipliers, forces])[None]
-    below = np.arange(1, levels)
+    orders = np.arange(1, levels)
 
     def level(coefficients: Any, order_and_load: Any) -> tuple[Any, None]:
-        k, missing = order_and_load
-        earlier = coefficients[(k - below) % levels]  # zero if not computed yet, also where the index wraps
+        k, deficit = order_and_load
+        previous = coefficients[(k - orders) % levels]  # zero if not computed yet, also where the index wraps
 
         def lower(slope: Slope, forces: Any) -> Any:
-            needed = jnp.where((below <= k).reshape(-1, 1, 1, 1, 1), slope[1:], 0.0)  # the rest may not be finite
-            return jnp.sum(needed * forces[:, None], axis=(0, 2))
+            active = jnp.where((orders <= k).reshape(-1, 1, 1, 1, 1), slope[1:], 0.0)  # the rest may not be finite
+            return jnp.sum(active * forces[:, None], axis=(0, 2))
 
-        missing = missing - on_bodies(lower, felt, earlier[:, :rows]) - on_bodies(lower, resisted, earlier[:, rows:])
-        trial = coefficients.at[k, :rows].set(solve(missing))
-        pressing = jnp.concatenate([its.normal_forces(list(trial[:, :rows])) for its in rubbing], axis=1)
+        deficit = deficit - on_bodies(lower, felt, previous[:, :rows]) - on_bodies(lower, resisted, previous[:, rows:])
+        trial = coefficients.at[k, :rows].set(solve(deficit))
+        pressing = jnp.concatenate([joint.normal_forces(list(trial[:, :rows])) for joint in rubbing], axis=1)
         newest = coupling.solved(trial[k, :rows], pressing[k])
         return coefficients.at[k].set(jnp.concatenate(newest)), None
 

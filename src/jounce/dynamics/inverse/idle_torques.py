@@ -24,16 +24,16 @@ def checked(forces: Any) -> Any:
     if not any(isinstance(group.element, SpinHold) for group in model.system.groups):
         return forces
     multipliers, solved = np.nan_to_num(forces.multipliers), motion.status == Status.OK
-    most = np.abs(multipliers[..., solved]).max(axis=(1, 2), initial=0.0) * model.length
+    max_torques = np.abs(multipliers[..., solved]).max(axis=(1, 2), initial=0.0) * model.length
     rate = _rate(forces, solved)
-    for level in range(1, len(most)):  # a level that vanishes is as exact as the level before
-        most[level] = max(most[level], rate * most[level - 1])
+    for level in range(1, len(max_torques)):  # a level that vanishes is as exact as the level before
+        max_torques[level] = max(max_torques[level], rate * max_torques[level - 1])
     for place in forces.indices.values():
         group = model.system.groups[place.group]
         if not isinstance(group.element, SpinHold):
             continue
         torque = np.abs(multipliers[:, list(place.own_rows)][..., solved]).max(axis=(1, 2), initial=0.0)
-        if (torque > NOTHING * most).any():
+        if (torque > NOTHING * max_torques).any():
             body = model.bodies[group.bodies[0][place.instance] - 1]
             message = (
                 "inertia or forces would spin this body about an axis of itself, which nothing prescribes, and the "
@@ -45,10 +45,10 @@ def checked(forces: Any) -> Any:
 
 def _rate(forces: Any, solved: Numbers) -> float:
     """Return the rate of change of the motion, 1/s, from the sizes of its Taylor coefficients."""
-    parts = {"position": forces.model.length, "angle": 1.0, "quaternion": 1.0}
+    lengths = {"position": forces.model.length, "angle": 1.0, "quaternion": 1.0}
     sizes = [
         np.nan_to_num(np.abs(forces.coordinates[name][1:, ..., solved])).reshape(forces.levels + 1, -1) / scale
-        for name, scale in parts.items()
+        for name, scale in lengths.items()
         if name in forces.coordinates
     ]
     powers = 1.0 / np.arange(1.0, forces.levels + 2)

@@ -42,8 +42,8 @@ class JointFriction:
     def resisted(self, index: int) -> Float[Numbers, "order instance time"]:
         """Return the friction power of a group for a unit normal force, as Taylor coefficients."""
         forces, group = self.forces, self.forces.joined.groups[index]
-        moving = [forces.coordinates_of(slot, forces.levels + 1) for slot in group.bodies]
-        return forces.along(programs.resisted, group.element, moving, levels=forces.levels)
+        poses = [forces.coordinates_of(slot, forces.levels + 1) for slot in group.bodies]
+        return forces.along(programs.resisted, group.element, poses, levels=forces.levels)
 
     def pressing_force(
         self, name: str, multipliers: Numbers, lanes: np.ndarray
@@ -53,12 +53,12 @@ class JointFriction:
         """
         place = self.forces.indices[name]
         group = self.forces.joined.groups[place.group]
-        own = multipliers[:, place.rows].reshape(len(multipliers), -1, group.instances, len(lanes))
+        group_multipliers = multipliers[:, place.rows].reshape(len(multipliers), -1, group.instances, len(lanes))
         if loses_torque(group.element):
-            return np.asarray(own)[:, :, place.instance]
-        joint, how = at_lanes(self.forces.joint(place.group), lanes), {"slot": group.moving_slots[-1]}
-        joined = *joint, own, None
-        works = self.forces.along(programs.joint_wrench, group.element, joined, levels=self.forces.levels, **how)
+            return np.asarray(group_multipliers)[:, :, place.instance]
+        joint, options = at_lanes(self.forces.joint(place.group), lanes), {"slot": group.moving_slots[-1]}
+        arguments = *joint, group_multipliers, None
+        works = self.forces.along(programs.joint_wrench, group.element, arguments, levels=self.forces.levels, **options)
         return works[:, : self.forces.pose_type.shifts, place.instance]
 
     @property
@@ -71,10 +71,10 @@ class JointFriction:
         """Half the difference of the forward and backward loss of gears; zero for other joints."""
         return self._of_joints(lambda gear: gear.losses[1], lambda _: 0.0)
 
-    def _of_joints(self, of_gears: Callable[[Any], Any], of_others: Callable[[Any], Any]) -> np.ndarray:
+    def _of_joints(self, of_gears: Callable[[Any], Any], of_joints: Callable[[Any], Any]) -> np.ndarray:
         """Return a value of the friction of each joint, in the order of their groups."""
         groups = [self.forces.joined.groups[k] for k in self.first_rows]
-        values = [(of_gears if loses_torque(g.element) else of_others)(g.element.friction) for g in groups]
+        values = [(of_gears if loses_torque(g.element) else of_joints)(g.element.friction) for g in groups]
         pairs = zip(values, groups, strict=True)
         return np.concatenate([np.zeros(0), *(np.broadcast_to(np.ravel(x), g.instances) for x, g in pairs)])
 
@@ -90,25 +90,25 @@ class JointFriction:
     def _slips(self, index: int) -> int:
         """Return the number of directions in which the joints of a group slip."""
         group = self.forces.joined.groups[index]
-        moving = at_lanes([self.forces.coordinates_of(slot, 2) for slot in group.bodies], np.zeros(1, int))
-        return programs.slip_directions(group.element, moving, self.forces.pose_type)
+        poses = at_lanes([self.forces.coordinates_of(slot, 2) for slot in group.bodies], np.zeros(1, int))
+        return programs.slip_directions(group.element, poses, self.forces.pose_type)
 
     def responses(self) -> Float[np.ndarray, "direction row time"]:
         """Return the multipliers that balance a unit friction force in each direction of slip, at rest."""
         forces = self.forces
 
-        def lanes_of(lanes: np.ndarray) -> Any:
+        def arguments_of(lanes: np.ndarray) -> Any:
             loads = np.concatenate([self._unit_loads(index, lanes) for index in self.first_rows])
             bodies, _, flanks, instants = at_lanes(forces.balance, lanes)
             return cut(bodies, 0), flanks, instants, loads
 
-        how = {"pose_type": forces.pose_type}
-        return programs.responses.at_instants(forces.joined, lanes_of, len(forces.motion.time), **how)[0]
+        options = {"pose_type": forces.pose_type}
+        return programs.responses.at_instants(forces.joined, arguments_of, len(forces.motion.time), **options)[0]
 
     def _unit_loads(self, index: int, lanes: np.ndarray) -> Float[np.ndarray, "direction coordinate body time"]:
         """Return the wrenches on bodies for a unit friction force in each direction of slip of a group."""
         forces, group = self.forces, self.forces.joined.groups[index]
-        moving = at_lanes([forces.coordinates_of(slot, 2) for slot in group.bodies], lanes)
+        poses = at_lanes([forces.coordinates_of(slot, 2) for slot in group.bodies], lanes)
         count, bodies = self._slips(index), len(forces.model.bodies)
         components = forces.pose_type.shifts + forces.pose_type.turns
         loads = np.zeros((group.instances, count, components, bodies + 1, len(lanes)))
@@ -116,8 +116,8 @@ class JointFriction:
             radius = None if loses_torque(group.element) else group.element.friction.radius
             unit = with_field(group, "friction", UnitFriction(radius, direction)).element
             for slot in group.moving_slots:
-                how = {"pose_type": forces.pose_type, "slot": slot, "levels": 1}
-                slope = programs.friction_slopes.program(unit, moving, **how)(moving)[0, :, 0]
+                options = {"pose_type": forces.pose_type, "slot": slot, "levels": 1}
+                slope = programs.friction_slopes.program(unit, poses, **options)(poses)[0, :, 0]
                 for instance, body in enumerate(group.bodies[slot]):
                     loads[instance, direction, :, body] += slope[:, instance]
         return loads[:, :, :, 1:].reshape(-1, components, bodies, len(lanes))
@@ -132,10 +132,10 @@ class JointFriction:
         components = []
         for index in self.first_rows:
             group = forces.joined.groups[index]
-            own = multipliers[self._rows(index)].reshape(-1, group.instances, multipliers.shape[-1])
-            joined = *forces.joint(index), own
-            part = forces.along(programs.pressing, group.element, joined, slot=group.moving_slots[-1])
-            components.append(np.pad(part, [(0, forces.pose_type.shifts - len(part)), (0, 0), (0, 0)]))
+            group_multipliers = multipliers[self._rows(index)].reshape(-1, group.instances, multipliers.shape[-1])
+            arguments = *forces.joint(index), group_multipliers
+            force = forces.along(programs.pressing, group.element, arguments, slot=group.moving_slots[-1])
+            components.append(np.pad(force, [(0, forces.pose_type.shifts - len(force)), (0, 0), (0, 0)]))
         return np.concatenate(components, axis=1).swapaxes(0, 1)
 
     def _rows(self, index: int) -> slice:

@@ -34,8 +34,8 @@ def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers,
             "prescribe, as friction grows as fast as the normal forces in joints; give a smaller coefficient or "
             "radius, gears a larger efficiency, or drivers more mechanical advantage"
         )
-        where = ", ".join(f"{name}.friction" for name in names)
-        raise SolveError(message, name=where, motion=_locked_at(motion, np.asarray(locked)), status=Status.LOCKED)
+        locations = ", ".join(f"{name}.friction" for name in names)
+        raise SolveError(message, name=locations, motion=_locked_at(motion, np.asarray(locked)), status=Status.LOCKED)
 
 
 def _locked_at(motion: Motion, locked: Bool[np.ndarray, " time"]) -> Motion:
@@ -68,16 +68,16 @@ def without_undetermined_rates(forces: Any, multipliers: Float[Numbers, "case or
     lanes = np.flatnonzero((normal <= NONE * size).any(axis=0))
     if not len(lanes):
         return multipliers
-    open_ = np.zeros(multipliers.shape[-1], bool)
+    is_undetermined = np.zeros(multipliers.shape[-1], bool)
     for name in names:
-        held = forces.friction.pressing_force(
+        joint_force = forces.friction.pressing_force(
             name, multipliers[0, :, : len(forces.model.rows), lanes].transpose(1, 2, 0), lanes
         )
-        sizes = np.abs(held).max(axis=1) / forces.rates[lanes] ** np.arange(len(held))[:, None]
-        passed = (sizes[0] <= NONE * size) & (sizes[1:].max(axis=0, initial=0.0) > NONE * size)
-        open_[lanes[passed]] = True
-        forces.passing.setdefault(name, forces.motion.time[lanes[passed]])
-    return np.where(open_ & (np.arange(multipliers.shape[1]) > 0)[:, None, None], np.nan, multipliers)
+        sizes = np.abs(joint_force).max(axis=1) / forces.rates[lanes] ** np.arange(len(joint_force))[:, None]
+        passes_zero = (sizes[0] <= NONE * size) & (sizes[1:].max(axis=0, initial=0.0) > NONE * size)
+        is_undetermined[lanes[passes_zero]] = True
+        forces.passing.setdefault(name, forces.motion.time[lanes[passes_zero]])
+    return np.where(is_undetermined & (np.arange(multipliers.shape[1]) > 0)[:, None, None], np.nan, multipliers)
 
 
 def passing_words(forces: Any) -> str:

@@ -53,15 +53,15 @@ def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable
 def _check_pitch_line(motion: Motion, element: Any, poses: Sequence[Any], names: Sequence[str]) -> None:
     """Raise MechanismError if a wheel is not at its pitch radius from the line it rolls on."""
     slope = np.tan(np.asarray(element.pressure_angle))
-    away = np.asarray(_parted.along(element, (poses, motion.time), pose_type=motion.poses[0]))
-    away = np.where(slope > 0, away / np.where(slope > 0, slope, 1.0), 0.0)
+    deviation = np.asarray(_parted.along(element, (poses, motion.time), pose_type=motion.poses[0]))
+    deviation = np.where(slope > 0, deviation / np.where(slope > 0, slope, 1.0), 0.0)
     radius = np.asarray(element.radius)
-    bad = (np.abs(away) > OFF_PITCH * radius) & (motion.status == Status.OK)
-    if bad.any():
-        instance, lane = np.argwhere(bad)[0]
+    is_off_pitch = (np.abs(deviation) > OFF_PITCH * radius) & (motion.status == Status.OK)
+    if is_off_pitch.any():
+        instance, lane = np.argwhere(is_off_pitch)[0]
         size = radius[instance, 0]
         message = (
-            f"at t = {motion.time[lane]:g} s the center is {away[instance, lane] - size:.6g} m to the left of the "
+            f"at t = {motion.time[lane]:g} s the center is {deviation[instance, lane] - size:.6g} m to the left of the "
             f"line, and must be {-size:.6g} m, the radius to its right: move the line or the center, reverse the "
             "line, or guide the rack so that it keeps its distance"
         )
@@ -70,13 +70,13 @@ def _check_pitch_line(motion: Motion, element: Any, poses: Sequence[Any], names:
 
 def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names: Sequence[str]) -> None:
     """Raise MechanismError if the contact of gears in space at their pitch point does not fit their ratio."""
-    its = _meshing.along(gears, poses, pose_type=motion.poses[0])
-    (first, second), drift, speed = its["radii"], its["drift"], its["speed"]
+    geometry = _meshing.along(gears, poses, pose_type=motion.poses[0])
+    (first, second), drift, speed = geometry["radii"], geometry["drift"], geometry["speed"]
     helix = 0.0 if gears.helix_angle is None else np.asarray(gears.helix_angle)
-    rolls = its["sliding"] <= ROLLING * first
-    skew = (its["distance"] > ROLLING * (first + second)) & (its["angle"] > ROLLING)
+    rolls = geometry["sliding"] <= ROLLING * first
+    skew = (geometry["distance"] > ROLLING * (first + second)) & (geometry["angle"] > ROLLING)
     friction = getattr(gears.friction, "lead_angle", None)
-    lead = its["lead"] if friction is None else np.asarray(friction)
+    lead = geometry["lead"] if friction is None else np.asarray(friction)
     on_axis = (
         "the third point, the pitch point, lies on the axis of the {} gear, and must be where the teeth of both touch"
     )
@@ -94,13 +94,13 @@ def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names:
             "points",
         ),
         (
-            skew & (its["plane"] <= ROLLING * first * second),
+            skew & (geometry["plane"] <= ROLLING * first * second),
             "at the third point both gears move along one line, so that they touch in no plane: give a point on the "
             "common perpendicular of the axes, or near it",
             "points",
         ),
         (
-            skew & (np.minimum(first, second) > FAR * its["distance"]),
+            skew & (np.minimum(first, second) > FAR * geometry["distance"]),
             "the third point is {first:.6g} m and {second:.6g} m from axes that are {distance:.6g} m apart: give where "
             "the teeth touch; a number without a unit is in m",
             "points",
@@ -112,44 +112,44 @@ def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names:
             "helix_angle",
         ),
         (
-            skew & (np.abs(its["lead"] - lead) > LEAD),
+            skew & (np.abs(geometry["lead"] - lead) > LEAD),
             "the lead angle of the first gear is {lead:.4g} deg by the pitch point and the ratio: give that one to the "
             "friction, or move the pitch point",
             "friction.lead_angle",
         ),
         (
-            rolls & (its["cone"] <= ROLLING) & (helix != 0),
+            rolls & (geometry["cone"] <= ROLLING) & (helix != 0),
             "the first gear is a crown wheel, whose teeth have no hand about its axis: give the other gear first",
             "helix_angle",
         ),
     )
-    for bad, words, where in faults:
-        if (odd := np.argwhere(bad & (motion.status == Status.OK))).size:
-            at = tuple(odd[0])
-            numbers = {"first": first[at], "second": second[at], "sliding": its["sliding"][at]}
-            numbers["distance"] = its["distance"][at]
-            numbers["lead"] = np.degrees(its["lead"][at])
-            message = words.format(time=motion.time[at[1]], **numbers)
-            raise MechanismError(message, name=f"{names[at[0]]}.{where}")
+    for is_wrong, message_, field in faults:
+        if (odd := np.argwhere(is_wrong & (motion.status == Status.OK))).size:
+            position = tuple(odd[0])
+            numbers = {"first": first[position], "second": second[position], "sliding": geometry["sliding"][position]}
+            numbers["distance"] = geometry["distance"][position]
+            numbers["lead"] = np.degrees(geometry["lead"][position])
+            message = message_.format(time=motion.time[position[1]], **numbers)
+            raise MechanismError(message, name=f"{names[position[0]]}.{field}")
 
 
 @Mapped
 def _meshing(gears: Any, poses: Sequence[Any], *, pose_type: Any) -> Mapping[str, Any]:
     """Return the contact geometry of gears in space, (instances, time): lengths in m, per rad of rotation of gear i."""
-    moving = [pose_of(pose, pose_type, 1) for pose in poses]
-    bodies, rates = [movable(pose.truncate(0)) for pose in moving], velocities([movable(pose) for pose in moving])
+    jets = [pose_of(pose, pose_type, 1) for pose in poses]
+    bodies, rates = [movable(pose.truncate(0)) for pose in jets], velocities([movable(pose) for pose in jets])
     mesh = PitchPoint.of(gears, tuple(bodies))
     points = [b.point(point) for b, point in zip(bodies[:2], (gears.point_i, gears.point_j), strict=True)]
-    drift = [velocity_at(body, its, point) - velocity_at(bodies[2], rates[2], point)
-             for body, its, point in zip(bodies[:2], rates, points, strict=False)]  # fmt: skip
-    across, sliding = cross(*mesh.axes), _size(mesh.sliding)
+    drift = [velocity_at(body, rate, point) - velocity_at(bodies[2], rates[2], point)
+             for body, rate, point in zip(bodies[:2], rates, points, strict=False)]  # fmt: skip
+    normal, sliding = cross(*mesh.axes), _size(mesh.sliding)
     return {
         "radii": jnp.stack([_size(arm) for arm in mesh.arms]),
         "sliding": sliding,
         "drift": jnp.stack([_size(x) for x in drift]),
-        "speed": jnp.stack([_size(its[1] - rates[2][1]) for its in rates[:2]]),
-        "angle": _size(across),
-        "distance": jnp.abs((points[1] - points[0]).dot(across).coefficients[0]) / jnp.maximum(_size(across), 1e-300),
+        "speed": jnp.stack([_size(rate[1] - rates[2][1]) for rate in rates[:2]]),
+        "angle": _size(normal),
+        "distance": jnp.abs((points[1] - points[0]).dot(normal).coefficients[0]) / jnp.maximum(_size(normal), 1e-300),
         "lead": jnp.arcsin(jnp.minimum(jnp.abs(mesh.sliding.dot(mesh.axes[0]).coefficients[0]) / sliding, 1.0)),
         "plane": _size(cross(*mesh.arms)),
         "cone": jnp.abs(cross(mesh.normal, mesh.arms[0]).dot(mesh.axes[0]).coefficients[0]) / _size(mesh.arms[0]),
@@ -164,11 +164,11 @@ def _size(vector: Jet) -> Any:
 def _parted(element: Any, lanes: tuple[Sequence[Any], Any], *, pose_type: Any) -> Any:
     """Return the difference of a residual with and without a flank."""
     poses, instants = lanes
-    built = [pose_type.from_coordinates({name: Jet([c[0]]) for name, c in pose.items()}) for pose in poses]
+    position_poses = [pose_type.from_coordinates({name: Jet([c[0]]) for name, c in pose.items()}) for pose in poses]
     group = Group(element, ())
     time = Jet([instants[None]])
 
     def residual(flank: float) -> Any:
-        return stacked(with_field(group, "flank", flank).element.residual(*built, time))[0]
+        return stacked(with_field(group, "flank", flank).element.residual(*position_poses, time))[0]
 
     return residual(1.0) - residual(0.0)

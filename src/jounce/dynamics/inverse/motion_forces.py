@@ -92,8 +92,8 @@ class MotionForces:
         multipliers = self._balancing[0][:, : len(self.model.rows)]
         passages, time = self.motion.passages, self.motion.time
         if passages:  # at a distance d from a change point, multipliers and their rounding grow as 1 / d
-            unknown = [spoiled(passages, time, level + 1) for level in range(len(multipliers))]
-            multipliers = np.where(np.array(unknown)[:, None], np.nan, multipliers)
+            is_unknown = [spoiled(passages, time, level + 1) for level in range(len(multipliers))]
+            multipliers = np.where(np.array(is_unknown)[:, None], np.nan, multipliers)
         return multipliers
 
     @cached_property
@@ -102,12 +102,12 @@ class MotionForces:
         if not self.flanks:
             return self._balanced({})
         check_meshing(self.motion, self.joined.groups, self.coordinates_of)
-        multipliers, known, self._reversals = teeth.multipliers_on_flanks(
+        multipliers, known_flanks, self._reversals = teeth.multipliers_on_flanks(
             self._balanced, self.flanks, self.model, self.motion
         )
         if self._seeks_undetermined:  # undetermined forces load no known flank: random ones show what depends on them
-            multipliers = np.stack([multipliers[0], self._balanced(teeth.random_for_flanks(known))[1]])
-        self.flanks = known
+            multipliers = np.stack([multipliers[0], self._balanced(teeth.random_for_flanks(known_flanks))[1]])
+        self.flanks = known_flanks
         return multipliers
 
     def prepare(self) -> None:
@@ -115,15 +115,15 @@ class MotionForces:
         cases, rows = 1 + self._seeks_undetermined, len(self.model.rows)
         choice = np.zeros(rows), np.zeros(cases), np.zeros((cases, rows))
         shared = self._balance(None if self.model.system.rank is None else choice)
-        large = programs.largest_array(self.model)
-        programs.balanced.prepare(shared, self.balance, large=large, pose_type=self.pose_type)
+        max_array = programs.largest_array(self.model)
+        programs.balanced.prepare(shared, self.balance, large=max_array, pose_type=self.pose_type)
 
     def _balanced(self, flanks: teeth.Flanks) -> Float[Numbers, "case level row time"]:
         """Return the multipliers that balance the loads, and self-balanced ones, given the loaded tooth flanks."""
         self.flanks = flanks
         shared = self._balance(None if self.model.system.rank is None else self._choice)
-        large = programs.largest_array(self.model)
-        multipliers, finite = self.along(programs.balanced, shared, self.balance, large=large)
+        max_array = programs.largest_array(self.model)
+        multipliers, finite = self.along(programs.balanced, shared, self.balance, large=max_array)
         check_finite_forces(self, finite)
         check_not_locked(self.motion, self.joined, multipliers[0])
         check_finite_values(self, multipliers[0])
@@ -131,8 +131,8 @@ class MotionForces:
 
     def _balance(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
         """Return the arguments of a balance that all instants share, for a choice of redundant multipliers."""
-        free = programs.without_constraints(self.joined, of_one_lane(self.forces))
-        return self.joined, free, self.masses, self.gravity, choice
+        force_system = programs.without_constraints(self.joined, of_one_lane(self.forces))
+        return self.joined, force_system, self.masses, self.gravity, choice
 
     @property
     def balance(self) -> Any:
@@ -168,13 +168,13 @@ class MotionForces:
         if self.undetermined is None:
             return values
         solved = self.motion.status == Status.OK
-        given = np.abs(quantity(self.undetermined)[..., solved]).max(axis=-1, initial=0.0)
-        level = np.abs(self.undetermined.multipliers[..., solved]).max(axis=-1, initial=0.0) * self.open.weights
-        limits = OPEN * size * level.max(axis=-1)[:, None]
-        open_ = given > limits
+        sizes = np.abs(quantity(self.undetermined)[..., solved]).max(axis=-1, initial=0.0)
+        level_sizes = np.abs(self.undetermined.multipliers[..., solved]).max(axis=-1, initial=0.0) * self.open.weights
+        limits = OPEN * size * level_sizes.max(axis=-1)[:, None]
+        is_open = sizes > limits
         if np.count_nonzero(solved) > 1:  # a quantity that vanishes at all instants has no rates
-            open_[1:] = open_[0]
-        return np.where(np.logical_or.accumulate(open_, axis=0)[..., None], np.nan, values)
+            is_open[1:] = is_open[0]
+        return np.where(np.logical_or.accumulate(is_open, axis=0)[..., None], np.nan, values)
 
     @cached_property
     def unique_multipliers(self) -> Numbers:
@@ -259,26 +259,26 @@ class MotionForces:
             Taylor coefficients.
         """
         group, instance = self._member(name)
-        element, whole = group.element, [slot[instance] for slot in group.bodies]  # 0 is the ground
+        element, bodies = group.element, [slot[instance] for slot in group.bodies]  # 0 is the ground
         # the carriage of a joint with a hidden coordinate does not count as a body
-        joined = enumerate(whole[: len(whole) - bool(getattr(element, "hidden", ()))])
+        slots = enumerate(bodies[: len(bodies) - bool(getattr(element, "hidden", ()))])
         if body:
-            work = total(self._wrench(name, slot) for slot, its in joined if its == body)
+            work = total(self._wrench(name, slot) for slot, index_ in slots if index_ == body)
             return self._expressed(work, body, frame, point)
-        moving = {slot: its for slot, its in joined if its and slot not in getattr(element, "unfelt", ())}
-        works = [self._wrench(name, slot) for slot in moving]
-        poses = [self.coordinates_of((its,), self.levels) for its in moving.values()]
+        movable = {slot: index_ for slot, index_ in slots if index_ and slot not in getattr(element, "unfelt", ())}
+        works = [self._wrench(name, slot) for slot in movable]
+        poses = [self.coordinates_of((index_,), self.levels) for index_ in movable.values()]
         work = self.along(programs.transmitted_wrench, point[:, None, None], (works, poses))
         return self._expressed(work, 0, frame, np.zeros(np.shape(point)))
 
     def point_of(self, name: str, body: int) -> Float[Numbers, " component"]:
         """Return the point of a joint, driver or force on a body; the origin of the body if it has none there."""
         group, instance = self._member(name)
-        slots = [slot for slot, its in enumerate(group.bodies) if its[instance] == body]
+        slots = [slot for slot, indices in enumerate(group.bodies) if indices[instance] == body]
         names = [f"point_{'ijmn'[slot : slot + 1]}" for slot in slots[:1]] + ["point"] * (len(group.bodies) == 1)
-        given = [value for key in names if (value := getattr(group.element, key, None)) is not None]
-        given += [group.element.first_on(slot) for slot in slots[:1] if hasattr(group.element, "first_on")]
-        return given[0].reshape(self.pose_type.shifts, -1)[:, instance] if given else np.zeros(self.pose_type.shifts)
+        points = [value for key in names if (value := getattr(group.element, key, None)) is not None]
+        points += [group.element.first_on(slot) for slot in slots[:1] if hasattr(group.element, "first_on")]
+        return points[0].reshape(self.pose_type.shifts, -1)[:, instance] if points else np.zeros(self.pose_type.shifts)
 
     def _member(self, name: str) -> tuple[Group, int]:
         """Return the group of a joint, driver or force, and its index in the group."""
@@ -295,16 +295,16 @@ class MotionForces:
         if place := self.indices.get(name):
             first, group, rubbed = self.friction.first_rows.get(place.group), self.joined.groups[place.group], None
             if first is not None:
-                moving = [self.coordinates_of(its, self.levels + 1) for its in group.bodies]
-                rubbed = moving, self._balancing[0][:, None, first : first + group.instances]
+                poses = [self.coordinates_of(indices, self.levels + 1) for indices in group.bodies]
+                rubbed = poses, self._balancing[0][:, None, first : first + group.instances]
             lanes = *self.joint(place.group), self._of_group(place), rubbed
-            how = {"slot": slot, "levels": self.levels}
-            wrench = self._once(programs.joint_wrench, group.element, lanes, place.group, **how)
+            options = {"slot": slot, "levels": self.levels}
+            wrench = self._once(programs.joint_wrench, group.element, lanes, place.group, **options)
             wrench = wrench[:, :, place.instance]
             return teeth.without_undetermined_rates(wrench, self._reversals.get(place.group), place.instance)
         index, instance = self._force_index(name)
-        lanes, how = (*self._acting(index, self.levels), self._sizes(index)), {"slot": slot, "levels": self.levels}
-        return self._once(programs.force_wrench, self._free(index), lanes, index, **how)[:, :, instance]
+        lanes, options = (*self._acting(index, self.levels), self._sizes(index)), {"slot": slot, "levels": self.levels}
+        return self._once(programs.force_wrench, self._free(index), lanes, index, **options)[:, :, instance]
 
     def applied_force(self, name: str) -> Numbers:
         """Return an applied force, as Taylor coefficients, (levels, components, time)."""

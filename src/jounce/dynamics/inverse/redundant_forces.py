@@ -59,38 +59,38 @@ def least_multipliers(
     soft = compliance[:, None] * system.row_scale**2
     soft = soft / jnp.max(soft)
     basis = range_basis(jnp.swapaxes(jacobian, 0, 1), system.rank or rows)
-    within = jnp.sum(basis[:, :, None] * jnp.swapaxes(jacobian, 0, 1)[:, None], axis=0)
-    factor = DenseFactor.of(saddle_point((jnp.eye(rows) * soft)[..., None], within))
-    solved: list[Any] = []
+    reduced = jnp.sum(basis[:, :, None] * jnp.swapaxes(jacobian, 0, 1)[:, None], axis=0)
+    factor = DenseFactor.of(saddle_point((jnp.eye(rows) * soft)[..., None], reduced))
+    multipliers_: list[Any] = []
     strains: list[Any] = []
     for k in range(len(load)):
-        missing = load[k]
-        for group, parts, forces in by_group(system, blocks, solved):
-            for slot, slope in zip(group.moving_slots, parts, strict=True):
-                missing -= onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
-        rest = -_jacobian_times_displacements(system, blocks, strains, k) * system.row_scale
-        rest = rest + (bent[:, None] if k == 0 else 0.0)
-        right = jnp.sum(basis * as_column(missing, scale)[:, None], axis=0)
-        solution = factor.solve(jnp.concatenate([jnp.broadcast_to(rest, (rows, right.shape[-1])), right]))
-        solved.append(solution[:rows] * system.row_scale)
+        deficit = load[k]
+        for group, slopes, forces in by_group(system, blocks, multipliers_):
+            for slot, slope in zip(group.moving_slots, slopes, strict=True):
+                deficit -= onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
+        gaps = -_jacobian_times_displacements(system, blocks, strains, k) * system.row_scale
+        gaps = gaps + (bent[:, None] if k == 0 else 0.0)
+        right = jnp.sum(basis * as_column(deficit, scale)[:, None], axis=0)
+        solution = factor.solve(jnp.concatenate([jnp.broadcast_to(gaps, (rows, right.shape[-1])), right]))
+        multipliers_.append(solution[:rows] * system.row_scale)
         strains.append(by_body(jnp.sum(basis * solution[rows:][None], axis=1), scale))
-    return jnp.stack(solved)
+    return jnp.stack(multipliers_)
 
 
 def _jacobian_times_displacements(
     system: System, blocks: Slopes, strains: Sequence[Any], level: int
 ) -> Float[Numbers, "row batch"]:
     """Return the Taylor coefficient of Jacobian times displacements, without the term of the Jacobian of order zero."""
-    parts = []
+    products = []
     for group, slopes in zip(system.groups, blocks, strict=True):
         product: Any = 0.0
         for slot, slope in zip(group.moving_slots, slopes, strict=True):
             for j in range(1, level + 1):
-                moved = jnp.pad(strains[level - j], ((0, 0), (1, 0), (0, 0)))[:, np.array(group.bodies[slot])]
-                product = product + jnp.sum(slope[j] * moved[:, None], axis=0)
+                displacements = jnp.pad(strains[level - j], ((0, 0), (1, 0), (0, 0)))[:, np.array(group.bodies[slot])]
+                product = product + jnp.sum(slope[j] * displacements[:, None], axis=0)
         _, _, rows, instances, lanes = slopes[0].shape
-        parts.append(jnp.broadcast_to(product, (rows, instances, lanes)).reshape(-1, lanes))
-    return jnp.concatenate(parts)
+        products.append(jnp.broadcast_to(product, (rows, instances, lanes)).reshape(-1, lanes))
+    return jnp.concatenate(products)
 
 
 class OpenMultipliers:
@@ -136,11 +136,11 @@ class OpenMultipliers:
         forces, couples = self._sizes
         compliances = np.zeros(len(forces))
         for name, stiffness in self.selection.items():
-            its = np.array([row.partition(".")[2] == name for row in self.model.rows])
+            is_own = np.array([row.partition(".")[2] == name for row in self.model.rows])
             for size, key in ((forces, "force"), (couples, "torque")):
-                compliances += np.where(its, size**2 / stiffness.get(key, math.inf), 0.0)
-        open_ = np.linalg.qr(self._basis * self._row_scale)[0]
-        if not np.linalg.eigvalsh(open_.T @ (compliances[:, None] * open_))[0] > 1e-12 * np.max(
+                compliances += np.where(is_own, size**2 / stiffness.get(key, math.inf), 0.0)
+        open_basis = np.linalg.qr(self._basis * self._row_scale)[0]
+        if not np.linalg.eigvalsh(open_basis.T @ (compliances[:, None] * open_basis))[0] > 1e-12 * np.max(
             compliances, initial=0.0
         ):
             affected = np.any(np.abs(self._basis) > OPEN, axis=1)
@@ -165,6 +165,6 @@ class OpenMultipliers:
         scale = np.asarray(self.model.system.column_scale)
         shifts = self.model.pose_type.shifts
         scaled = np.abs((self._jacobian / self._row_scale).reshape(len(self._jacobian), -1, len(scale)) / scale)
-        forces, couples = (np.linalg.norm(part, axis=2).max(axis=1) for part in np.split(scaled, [shifts], axis=2))
+        forces, couples = (np.linalg.norm(x, axis=2).max(axis=1) for x in np.split(scaled, [shifts], axis=2))
         pure = forces * self.model.length <= 1e-9 * couples
         return np.where(pure, 0.0, forces), np.where(pure, couples, 0.0)

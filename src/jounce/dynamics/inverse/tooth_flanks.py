@@ -82,20 +82,20 @@ def multipliers_on_flanks(
     rate, reversals, unsettled = rate_of(motion), {}, []
     for _ in range(MOST_CHANGES):
         pairs = {k: _signs(of_group(multipliers[0], k), multipliers[0], rate) for k in flanks}
-        now, reversals = ({k: pair[part] for k, pair in pairs.items()} for part in (0, 1))
-        unsettled = [(now[k] != flanks[k]).any(axis=0) for k in flanks]
+        next_flanks, reversals = ({k: pair[index_] for k, pair in pairs.items()} for index_ in (0, 1))
+        unsettled = [(next_flanks[k] != flanks[k]).any(axis=0) for k in flanks]
         if not np.any(unsettled):
             break
-        flanks, multipliers = now, solve(now)
+        flanks, multipliers = next_flanks, solve(next_flanks)
     else:
         multipliers = np.where(np.any(unsettled, axis=0), np.nan, multipliers)
     levels = multipliers.shape[1]
     if any((level < levels).any() for level in reversals.values()):
         other_multipliers = solve({k: np.where(reversals[k] < levels, -flank, flank) for k, flank in flanks.items()})
-        away = np.abs(other_multipliers[0] - multipliers[0]) > 1e-9 * np.abs(multipliers[0]).max(axis=1, keepdims=True)
+        drift = np.abs(other_multipliers[0] - multipliers[0]) > 1e-9 * np.abs(multipliers[0]).max(axis=1, keepdims=True)
         first = np.min([level.min(axis=0) for level in reversals.values()], axis=0)
-        away &= np.arange(levels)[:, None, None] >= first
-        multipliers = np.where(np.logical_or.accumulate(away, axis=0), np.nan, multipliers)
+        drift &= np.arange(levels)[:, None, None] >= first
+        multipliers = np.where(np.logical_or.accumulate(drift, axis=0), np.nan, multipliers)
     return multipliers, flanks, reversals
 
 
@@ -115,11 +115,11 @@ def rate_of(motion: Motion) -> Float[np.ndarray, " time"]:
     return rate
 
 
-def _signs(own: Numbers, whole: Numbers, rate: Float[np.ndarray, " time"]) -> tuple[np.ndarray, np.ndarray]:
+def _signs(values: Numbers, all_values: Numbers, rate: Float[np.ndarray, " time"]) -> tuple[np.ndarray, np.ndarray]:
     """Return flanks, and the first level at which the absolute value of a multiplier has no derivative, if any."""
-    levels = len(own)
-    scaled = np.nan_to_num(np.asarray(own)) / rate ** np.arange(levels)[:, None, None]
-    size = np.maximum(np.abs(np.nan_to_num(whole[0])).max(), np.abs(scaled).max(axis=0))
+    levels = len(values)
+    scaled = np.nan_to_num(np.asarray(values)) / rate ** np.arange(levels)[:, None, None]
+    size = np.maximum(np.abs(np.nan_to_num(all_values[0])).max(), np.abs(scaled).max(axis=0))
     matters = np.abs(scaled) > NONE * size
     first = np.where(matters.any(axis=0), matters.argmax(axis=0), levels)
     leading = np.take_along_axis(scaled, np.minimum(first, levels - 1)[None], axis=0)[0]
@@ -132,11 +132,11 @@ def flank_words(forces: Any, bodies: set[str]) -> str:
 
     `forces` are `MotionForces`.
     """
-    motion, words = forces.motion, []
+    motion, phrases = forces.motion, []
     for name, place in forces.indices.items():
         if place.group in forces.flanks and bodies & {*motion.mechanism.joints[name].bodies}:
-            words.append(_reversal_words(name, forces.multipliers[0][next(iter(place.own_rows))], motion))
-    return "; ".join(filter(None, words))
+            phrases.append(_reversal_words(name, forces.multipliers[0][next(iter(place.own_rows))], motion))
+    return "; ".join(filter(None, phrases))
 
 
 def _reversal_words(name: str, forces: Numbers, motion: Motion) -> str:
@@ -146,9 +146,9 @@ def _reversal_words(name: str, forces: Numbers, motion: Motion) -> str:
     sign[np.abs(forces[solved]) <= NONE * np.max(np.abs(forces[solved]), initial=0.0)] = 0.0
     zero = times[sign == 0] if sign.any() else times[:0]
     if zero.size:
-        where = listed(zero)
+        instants = listed(zero)
         return (
-            f"the load of {name} changes flanks at t = {where}: rates of the bearing forces that it causes are not "
+            f"the load of {name} changes flanks at t = {instants}: rates of the bearing forces that it causes are not "
             "determined"
         )
     changes = times[1:][sign[1:] != sign[:-1]]

@@ -135,20 +135,20 @@ def check_limits(
     breaks = distinct_instants(np.append(breaks, followed.loaded.changes), first, last)
     grid = with_sides(grid, breaks)
     values = curves(grid)
-    every = [(merged | shared.limits)[name] for name in names]
-    bounds = _Bounds(every, REST * np.abs(values[:, 1]).max(axis=0), trajectory.stop)
+    all_limits = [(merged | shared.limits)[name] for name in names]
+    bounds = _Bounds(all_limits, REST * np.abs(values[:, 1]).max(axis=0), trajectory.stop)
     jumps = jumps_of(followed, grid, values[:, : ORDER + 1, :count])
     infinite = shared.infinite(infinite_quantities(followed, jumps, drives), jumps)
-    moved = {count + k for k in shared.moving(followed.columns)}
-    moved |= {k for k, name in enumerate(robot.joint_names) if name not in resting}
+    moving_columns = {count + k for k in shared.moving(followed.columns)}
+    moving_columns |= {k for k, name in enumerate(robot.joint_names) if name not in resting}
     limited = [
         (quantity, joint)
         for joint in range(len(names))
         for quantity in range(len(FIELDS))
-        if (joint in moved if quantity not in EFFORTS else joint < count)
+        if (joint in moving_columns if quantity not in EFFORTS else joint < count)
     ]
-    at, values_there, shown = worst_instants(curves, bounds, grid, values, np.array(limited))
-    at = at_breaks(at, breaks, first, last)
+    instants, peaks, weights = worst_instants(curves, bounds, grid, values, np.array(limited))
+    instants = at_breaks(instants, breaks, first, last)
     rows = tuple(
         _row(
             robot.joints[names[joint]],
@@ -156,7 +156,7 @@ def check_limits(
             (quantity, joint),
             *bounds.or_infinite(infinite, quantity, joint, *worst),
         )
-        for (quantity, joint), *worst in zip(limited, at.tolist(), values_there.tolist(), shown.tolist(), strict=True)
+        for (quantity, joint), *worst in zip(limited, instants.tolist(), peaks.tolist(), weights.tolist(), strict=True)
     )
     ends = _ends(followed, shared, values[:, : ORDER + 1, :count], bounds, drives)
     for message in followed.doubts:
@@ -184,19 +184,19 @@ class _Bounds:
     own. A joint at rest is about to speed up, except at the end of the trajectory, `stop`.
     """
 
-    def __init__(self, every: Sequence[Limits], rest: np.ndarray, stop: float):
-        def table(*fields: str, missing: float = np.inf) -> np.ndarray:
-            numbers = np.array([[getattr(x, field) for x in every] for field in fields], float)  # None becomes NaN
-            return np.where(np.isnan(numbers), missing, numbers)
+    def __init__(self, all_limits: Sequence[Limits], rest: np.ndarray, stop: float):
+        def table(*fields: str, default: float = np.inf) -> np.ndarray:
+            numbers = np.array([[getattr(x, field) for x in all_limits] for field in fields], float)  # None becomes NaN
+            return np.where(np.isnan(numbers), default, numbers)
 
-        largest, (slower,) = table(*FIELDS[1:]), table("deceleration")
-        faster, given = largest[ACCELERATION - 1].copy(), np.isfinite(slower)
+        max_values, (slower,) = table(*FIELDS[1:]), table("deceleration")
+        faster, has_limit = max_values[ACCELERATION - 1].copy(), np.isfinite(slower)
         bound = np.where(np.isfinite(faster), faster, slower)
-        largest[ACCELERATION - 1], self.rest, self.stop = bound, rest, stop
-        self.speeding = np.where(given & ~np.isfinite(faster), 0.0, 1.0)
-        self.slowing = np.divide(bound, slower, out=np.ones(len(every)), where=given)
-        self.upper = np.concatenate([table("upper"), largest])
-        self.lower = np.concatenate([table("lower", missing=-np.inf), -largest])
+        max_values[ACCELERATION - 1], self.rest, self.stop = bound, rest, stop
+        self.speeding = np.where(has_limit & ~np.isfinite(faster), 0.0, 1.0)
+        self.slowing = np.divide(bound, slower, out=np.ones(len(all_limits)), where=has_limit)
+        self.upper = np.concatenate([table("upper"), max_values])
+        self.lower = np.concatenate([table("lower", default=-np.inf), -max_values])
         self.limited = np.isfinite(self.upper) | np.isfinite(self.lower)
         with np.errstate(invalid="ignore"):
             half = (self.upper - self.lower) / 2
@@ -213,26 +213,26 @@ class _Bounds:
         factors[..., ACCELERATION, :] = np.where(slows, self.slowing, self.speeding)
         return factors
 
-    def sides(self, values: Any, at: Any = ...) -> tuple[Any, Any]:
+    def sides(self, values: Any, index: Any = ...) -> tuple[Any, Any]:
         """Return the ratios of weighted values to the upper and to the lower bound, -inf if there is none."""
-        upper, lower, scale = self.upper[at], self.lower[at], self.scale[at]
+        upper, lower, scale = self.upper[index], self.lower[index], self.scale[index]
         return (values - upper + scale) / scale, (lower - values + scale) / scale
 
-    def measure(self, values: np.ndarray, at: Any = ...) -> np.ndarray:
+    def measure(self, values: np.ndarray, index: Any = ...) -> np.ndarray:
         """Return the measure whose maximum is the worst instant: the ratio, or the magnitude if there is no limit."""
-        return np.where(self.limited[at], np.maximum(*self.sides(values, at)), np.abs(values))
+        return np.where(self.limited[index], np.maximum(*self.sides(values, index)), np.abs(values))
 
     def or_infinite(
         self, infinite: Infinite, quantity: int, joint: int, time: float, value: float, weight: float
     ) -> tuple[float, float, float]:
         """Return the instant, value and weight of a quantity, or those of its first infinite value."""
         weights = self.weights(infinite.before, infinite.times)[:, quantity, joint]
-        at = np.flatnonzero((infinite.signs[:, quantity, joint] != 0) & (weights > 0))
-        if not len(at):
+        jumps = np.flatnonzero((infinite.signs[:, quantity, joint] != 0) & (weights > 0))
+        if not len(jumps):
             return time, value, weight
-        first = at[0]
-        value = np.copysign(np.inf, infinite.signs[first, quantity, joint])
-        return float(infinite.times[first]), float(value), float(weights[first])
+        jump = jumps[0]
+        value = np.copysign(np.inf, infinite.signs[jump, quantity, joint])
+        return float(infinite.times[jump]), float(value), float(weights[jump])
 
     def shares(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Return the ratios with the sign of the nearer bound, NaN if there is no limit."""
@@ -263,39 +263,40 @@ def worst_instants(
     limited : array of shape (curves, 2)
         Quantity and joint of each curve.
     """
-    at = tuple(limited.T)
+    columns = tuple(limited.T)
     weights = bounds.weights(values, grid)
-    measures = bounds.measure(values * weights)[:, *at]
-    every = np.arange(len(limited))
-    best = np.argmax(measures, axis=0)
-    times, sizes = grid[best], measures[best, every]
-    maxima, weight = values[best, *at], weights[best, *at]
+    measures = bounds.measure(values * weights)[:, *columns]
+    numbers = np.arange(len(limited))
+    top_indices = np.argmax(measures, axis=0)
+    times, sizes = grid[top_indices], measures[top_indices, numbers]
+    maxima, weight = values[top_indices, *columns], weights[top_indices, *columns]
     peaks = local_maxima(measures)
     low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, len(grid) - 1)]
-    share = np.linspace(0.0, 1.0, POINTS)
+    fractions = np.linspace(0.0, 1.0, POINTS)
     peak, curve = np.indices(low.shape)
     for _ in range(ROUNDS):
-        around = low + share[:, None, None] * (high - low)
-        there = curves(around.reshape(-1)).reshape(*around.shape, *values.shape[1:])
-        own, weights = (x[:, peak, curve, *at] for x in (there, bounds.weights(there, around)))
-        measured = bounds.measure(own * weights, at)
-        top = np.argmax(measured, axis=0)
-        chosen = np.argmax(np.max(measured, axis=0), axis=0)  # of the peaks of each curve
-        new = (top[chosen, every], chosen, every)
-        better = measured[new] > sizes + 1e-12 * np.abs(sizes)  # otherwise keep the instant of the grid, a round number
-        pairs = ((measured, sizes), (around, times), (own, maxima), (weights, weight))
-        sizes, times, maxima, weight = (np.where(better, x[new], y) for x, y in pairs)
-        low = np.take_along_axis(around, np.maximum(top - 1, 0)[None], axis=0)[0]
-        high = np.take_along_axis(around, np.minimum(top + 1, POINTS - 1)[None], axis=0)[0]
+        trials = low + fractions[:, None, None] * (high - low)
+        results = curves(trials.reshape(-1)).reshape(*trials.shape, *values.shape[1:])
+        curve_values, weights = (x[:, peak, curve, *columns] for x in (results, bounds.weights(results, trials)))
+        trial_measures = bounds.measure(curve_values * weights, columns)
+        top = np.argmax(trial_measures, axis=0)
+        chosen = np.argmax(np.max(trial_measures, axis=0), axis=0)  # of the peaks of each curve
+        highest = (top[chosen, numbers], chosen, numbers)
+        # otherwise keep the instant of the grid, a round number
+        is_better = trial_measures[highest] > sizes + 1e-12 * np.abs(sizes)
+        pairs = ((trial_measures, sizes), (trials, times), (curve_values, maxima), (weights, weight))
+        sizes, times, maxima, weight = (np.where(is_better, x[highest], y) for x, y in pairs)
+        low = np.take_along_axis(trials, np.maximum(top - 1, 0)[None], axis=0)[0]
+        high = np.take_along_axis(trials, np.minimum(top + 1, POINTS - 1)[None], axis=0)[0]
     return times, maxima, weight
 
 
-def _row(joint: Joint, bounds: _Bounds, at: tuple[int, int], time: float, value: float, weight: float) -> LimitRow:
-    word, unit = word_of(joint, at[0])
-    if not bounds.limited[at]:
+def _row(joint: Joint, bounds: _Bounds, entry: tuple[int, int], time: float, value: float, weight: float) -> LimitRow:
+    word, unit = word_of(joint, entry[0])
+    if not bounds.limited[entry]:
         return LimitRow(joint.name, word, unit, value, time)
-    above, below = (float(x) for x in bounds.sides(np.array(value * weight), at))
-    limit = (bounds.upper if above >= below else bounds.lower)[at] / (weight or 1.0)
+    above, below = (float(x) for x in bounds.sides(np.array(value * weight), entry))
+    limit = (bounds.upper if above >= below else bounds.lower)[entry] / (weight or 1.0)
     return LimitRow(joint.name, word, unit, value, time, float(limit), max(above, below, 0.0))
 
 
@@ -317,9 +318,9 @@ def _ends(
     return tuple(
         dataclasses.replace(
             end,
-            breaks=tuple((names[j], word_of(robot.joints[names[j]], q)[0]) for j, q in np.argwhere(own.T).tolist()),
+            breaks=tuple((names[j], word_of(robot.joints[names[j]], q)[0]) for j, q in np.argwhere(marks.T).tolist()),
         )
-        for end, own in zip(ends_of_jumps(robot.joint_names, jumps), broken, strict=True)
+        for end, marks in zip(ends_of_jumps(robot.joint_names, jumps), broken, strict=True)
     )
 
 
@@ -334,21 +335,21 @@ def _merged(robot: Robot, limits: Mapping[str, Limits] | Refused | None) -> dict
     if limits is not None and not isinstance(limits, Mapping):
         message = "must be a mapping of joints to Limits; of jn.planning.MotionLimits, give their `joints`"
         raise RobotError(message, name="limits", value=type(limits).__name__)
-    given = dict(limits or {})
-    for name, entry in given.items():
+    new_limits = dict(limits or {})
+    for name, entry in new_limits.items():
         if name not in robot.joint_names:
             raise RobotError(reason_not_movable(robot, name), name="limits", value=name)
         if not isinstance(entry, Limits):
             raise RobotError("must be Limits", name=f"limits.{name}", value=entry)
-    return robot.limits_with(given)
+    return robot.limits_with(new_limits)
 
 
 def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
     """Return the instants of a trajectory with its ends, and evenly spaced ones between each two."""
-    own = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
-    steps = max(BETWEEN, -(-INSTANTS // (len(own) - 1)))
-    between = own[:-1, None] + np.diff(own)[:, None] * (np.arange(steps) / steps)
-    return np.append(between.reshape(-1), own[-1])
+    instants = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
+    steps = max(BETWEEN, -(-INSTANTS // (len(instants) - 1)))
+    evenly_spaced = instants[:-1, None] + np.diff(instants)[:, None] * (np.arange(steps) / steps)
+    return np.append(evenly_spaced.reshape(-1), instants[-1])
 
 
 def _checked_times(times: ArrayLike) -> Float[np.ndarray, " time"]:

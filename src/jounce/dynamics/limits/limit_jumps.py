@@ -36,8 +36,8 @@ class Jumps:
     def above(self, level: int) -> Float[np.ndarray, "jump joint"]:
         """Return the sign of the lowest jump below a derivative, which makes it infinite; 0 if there is none."""
         signs = np.sign(self.after - self.before)[:, :level]
-        lowest = np.argmax(signs != 0, axis=1)
-        return np.take_along_axis(signs, lowest[:, None], axis=1)[:, 0]
+        level_index = np.argmax(signs != 0, axis=1)
+        return np.take_along_axis(signs, level_index[:, None], axis=1)[:, 0]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -82,16 +82,16 @@ def jumps_of(
         nothing = np.zeros((0, order + 1, joints))
         return Jumps(np.zeros(0), nothing, nothing)
     instants, sizes = [np.zeros(0)], [np.zeros((0, order, joints))]
-    unknown, bending = [], []
+    unknown_columns, bending = [], []
     leaders = LeaderValues()
     for column, law in zip(followed.columns, trajectory.laws.values(), strict=True):
-        own, jumps, everything = known_jumps(law, first, last, order - 1, leaders)
-        spread = np.zeros((len(own), order, joints))
+        law_instants, jumps, is_complete = known_jumps(law, first, last, order - 1, leaders)
+        spread = np.zeros((len(law_instants), order, joints))
         spread[:, :, column] = jumps.T
-        instants.append(own)
+        instants.append(law_instants)
         sizes.append(spread)
-        if not everything:
-            unknown.append(column)
+        if not is_complete:
+            unknown_columns.append(column)
             bending.append(law)
 
     def evaluate(times: np.ndarray) -> np.ndarray:
@@ -101,21 +101,21 @@ def jumps_of(
         q[:, :, followed.columns] = np.moveaxis(derivatives, -1, 0)
         return q
 
-    if unknown:
-        seen = observed_jumps(bending, first, last, order - 1)
-        spread = np.zeros((len(seen.instants), order, joints))
-        spread[:, :, unknown] = np.where(np.isinf(seen.sizes), np.finfo(float).max, seen.sizes)
-        instants.append(seen.instants)
+    if unknown_columns:
+        observed = observed_jumps(bending, first, last, order - 1)
+        spread = np.zeros((len(observed.instants), order, joints))
+        spread[:, :, unknown_columns] = np.where(np.isinf(observed.sizes), np.finfo(float).max, observed.sizes)
+        instants.append(observed.instants)
         sizes.append(spread)
-    where, heights = _joined(np.concatenate(instants), np.concatenate(sizes), SAME * duration)
+    edges, heights = _joined(np.concatenate(instants), np.concatenate(sizes), SAME * duration)
     heights = np.where(np.abs(heights) > SMALL * level_sizes(values, duration)[:-1], heights, 0.0)
-    inside = (where > first + SAME * duration) & (where < last - SAME * duration) & heights.any(axis=(1, 2))
-    where, heights = where[inside], heights[inside]
-    after = evaluate(where + SAME * duration / 2) if len(where) else np.zeros((0, order + 1, joints))
+    is_inside = (edges > first + SAME * duration) & (edges < last - SAME * duration) & heights.any(axis=(1, 2))
+    edges, heights = edges[is_inside], heights[is_inside]
+    after = evaluate(edges + SAME * duration / 2) if len(edges) else np.zeros((0, order + 1, joints))
     after = np.where(np.isfinite(after), after, 0.0)  # not finite next to a kink, as of asin(sin(t))
     before = after.copy()
     before[:, :-1] -= heights
-    return Jumps(where, before, after)
+    return Jumps(edges, before, after)
 
 
 def _joined(
@@ -127,8 +127,8 @@ def _joined(
     sequence = np.argsort(instants, kind="stable")
     instants, sizes = instants[sequence], sizes[sequence]
     begins = np.flatnonzero(np.append(True, np.diff(instants) > gap))
-    most, least = np.maximum.reduceat(sizes, begins), np.minimum.reduceat(sizes, begins)
-    return instants[begins], np.where(most >= -least, most, least)
+    maxima, minima = np.maximum.reduceat(sizes, begins), np.minimum.reduceat(sizes, begins)
+    return instants[begins], np.where(maxima >= -minima, maxima, minima)
 
 
 def infinite_quantities(followed: FollowedTrajectory, jumps: Jumps, drives: bool) -> Infinite:
@@ -159,13 +159,13 @@ def infinite_quantities(followed: FollowedTrajectory, jumps: Jumps, drives: bool
     times = np.tile(jumps.times, len(states))
     efforts = followed.torques(states.reshape(-1, *states.shape[2:]), times, drives)[:, 0]
     efforts = efforts.reshape(len(states), count, joints)
-    least = NONE * np.abs(efforts).max(axis=(0, 2))[:, None]
-    after, early, resting, *pushed = efforts
-    changes = np.stack([*(own - resting for own in pushed), after - early])
-    changed = np.where(np.abs(changes) > least, np.sign(changes), 0.0)
-    for quantity, those in ((EFFORT, changed[:2]), (EFFORT_RATE, changed)):
-        lowest = np.argmax(those != 0, axis=0)
-        signs[:, quantity] = np.take_along_axis(those, lowest[None], axis=0)[0]
+    threshold = NONE * np.abs(efforts).max(axis=(0, 2))[:, None]
+    after, effort_before, rest_effort, *pushed = efforts
+    changes = np.stack([*(pushed_effort - rest_effort for pushed_effort in pushed), after - effort_before])
+    changed = np.where(np.abs(changes) > threshold, np.sign(changes), 0.0)
+    for quantity, signs_ in ((EFFORT, changed[:2]), (EFFORT_RATE, changed)):
+        level_index = np.argmax(signs_ != 0, axis=0)
+        signs[:, quantity] = np.take_along_axis(signs_, level_index[None], axis=0)[0]
     return Infinite(jumps.times, signs, before)
 
 

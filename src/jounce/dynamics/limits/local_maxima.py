@@ -12,8 +12,8 @@ def local_maxima(measures: Float[np.ndarray, "time curve"]) -> Int[np.ndarray, "
     The height between about evenly spaced instants is estimated by the parabola through three of them.
     """
     height = local_heights(measures) + _above_samples(measures)
-    reaching = np.sum(height >= measures.max(axis=0), axis=0).max(initial=0)
-    order = largest_indices(height, int(np.clip(reaching, LEAST, MOST)))
+    count = np.sum(height >= measures.max(axis=0), axis=0).max(initial=0)
+    order = largest_indices(height, int(np.clip(count, LEAST, MOST)))
     usable = np.isfinite(np.take_along_axis(height, order, axis=0))
     return np.where(usable, order, np.argmax(measures, axis=0))
 
@@ -40,8 +40,8 @@ def largest_indices(height: Float[np.ndarray, "time curve"], count: int) -> Int[
 
     Indices repeat if fewer values are finite than are requested.
     """
-    left, every, order = height.copy(), np.arange(height.shape[1]), []
+    remaining, columns, order = height.copy(), np.arange(height.shape[1]), []
     for _ in range(count):
-        order.append(np.argmax(left, axis=0))
-        left[order[-1], every] = -np.inf
+        order.append(np.argmax(remaining, axis=0))
+        remaining[order[-1], columns] = -np.inf
     return np.stack(order)

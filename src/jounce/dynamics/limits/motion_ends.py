@@ -104,17 +104,17 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
     """
     trajectory, order = followed.trajectory, values.shape[1] - 1
     times = np.array([trajectory.start, trajectory.stop])
-    inside = INSIDE * float(times[1] - times[0])
-    *moving, before = followed.coordinates(np.append(times, times[1] - inside), order)
+    offset = INSIDE * float(times[1] - times[0])
+    *ends, last = followed.coordinates(np.append(times, times[1] - offset), order)
     sizes = level_sizes(values, float(times[1] - times[0]))
-    least = np.zeros(order + 1)
-    least[: len(LEAST)] = LEAST[: order + 1]
-    near = np.maximum(SMALL * sizes, least[:, None])
-    near[:-1] = np.maximum(near[:-1], 2 * inside * sizes[1:])
-    near = np.stack([near, near])
+    floors = np.zeros(order + 1)
+    floors[: len(LEAST)] = LEAST[: order + 1]
+    tolerances = np.maximum(SMALL * sizes, floors[:, None])
+    tolerances[:-1] = np.maximum(tolerances[:-1], 2 * offset * sizes[1:])
+    tolerances = np.stack([tolerances, tolerances])
     duration = float(times[1] - times[0])
     # at its last instant a piecewise law, such as polynomials between points, may already be on its next piece
-    moving = np.stack([moving[0], np.where(np.abs(moving[1] - before) > near[1], before, moving[1])])
+    ends = np.stack([ends[0], np.where(np.abs(ends[1] - last) > tolerances[1], last, ends[1])])
     for column, name in zip(followed.columns, trajectory.names, strict=True):
         law = trajectory.laws[name]
         if not isinstance(law, SplineMotion) or not law.samples.value:
@@ -125,16 +125,16 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
         # the estimated errors are relative to peaks
         wave = np.ptp(values[:, 0, column]) / 2 * (2 * np.pi / duration) ** np.arange(order + 1)
         noise = np.where(errors > UNSUPPORTED, np.inf, SAFE * errors * np.maximum(sizes[:, column], wave))
-        near[:, :, column] = np.maximum(near[:, :, column], noise)
+        tolerances[:, :, column] = np.maximum(tolerances[:, :, column], noise)
         if noise[1] > SLOW * sizes[1, column]:
             for k, end in enumerate((1, -1)):
                 speed, scatter = _fitted_speed(*(x[::end] for x in law.samples.value))
-                moving[k, 1, column] = speed
-                near[k, 1, column] = max(FAR * scatter, SLOW * sizes[1, column])
-    moving[:, 1:] = np.where(np.abs(moving) > near, moving, 0.0)[:, 1:]
-    rest = moving.copy()
-    rest[:, 1:] = 0.0
-    return Jumps(times, np.stack([rest[0], moving[1]]), np.stack([moving[0], rest[1]]))
+                ends[k, 1, column] = speed
+                tolerances[k, 1, column] = max(FAR * scatter, SLOW * sizes[1, column])
+    ends[:, 1:] = np.where(np.abs(ends) > tolerances, ends, 0.0)[:, 1:]
+    rest_values = ends.copy()
+    rest_values[:, 1:] = 0.0
+    return Jumps(times, np.stack([rest_values[0], ends[1]]), np.stack([ends[0], rest_values[1]]))
 
 
 def _fitted_speed(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> tuple[float, float]:

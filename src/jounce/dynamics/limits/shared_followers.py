@@ -63,22 +63,22 @@ class SharedFollowers:
     def with_followers(
         self, q: Float[np.ndarray, "time derivative coordinate"]
     ) -> Float[np.ndarray, "time derivative column"]:
-        """Return coordinates with derivatives, and theirs behind them."""
-        own = q @ self.weights.T
-        own[:, 0] += self.offset
-        return np.concatenate([q, own], axis=-1)
+        """Return coordinates with derivatives, followed by those of the shared followers."""
+        follower_values = q @ self.weights.T
+        follower_values[:, 0] += self.offset
+        return np.concatenate([q, follower_values], axis=-1)
 
     def infinite(self, infinite: Infinite, jumps: Jumps) -> Infinite:
-        """Return which quantities are infinite where coordinates jump, and theirs behind them."""
+        """Return which quantities are infinite where coordinates jump, followed by those of the shared followers."""
         before, after = (self.with_followers(x) for x in (jumps.before, jumps.after))
         sizes = np.abs(jumps.after - jumps.before) @ np.abs(self.weights).T
-        same = np.abs(after - before)[:, :, len(self.weights.T) :] <= SMALL * sizes  # jumps that cancel
-        later = after[:, :, len(self.weights.T) :]
-        later[same] = before[:, :, len(self.weights.T) :][same]
-        own = Jumps(jumps.times, before, after)
+        cancels = np.abs(after - before)[:, :, len(self.weights.T) :] <= SMALL * sizes  # jumps that cancel
+        follower_values = after[:, :, len(self.weights.T) :]
+        follower_values[cancels] = before[:, :, len(self.weights.T) :][cancels]
+        follower_jumps = Jumps(jumps.times, before, after)
         signs, slowing = (np.zeros((len(jumps.times), 6, len(self.joints))) for _ in range(2))
         for level in (1, 2, 3):
-            signs[:, level] = own.above(level)[:, len(self.weights.T) :]
+            signs[:, level] = follower_jumps.above(level)[:, len(self.weights.T) :]
         slowing[:, 1], slowing[:, 2] = before[:, 1, len(self.weights.T) :], signs[:, 2]
-        parts = ((infinite.signs, signs), (infinite.before, slowing))
-        return Infinite(infinite.times, *(np.concatenate(x, axis=-1) for x in parts))
+        pairs = ((infinite.signs, signs), (infinite.before, slowing))
+        return Infinite(infinite.times, *(np.concatenate(x, axis=-1) for x in pairs))

@@ -63,15 +63,15 @@ class FollowedTrajectory:
             raise RobotError("the robot has no moving joint; nothing can follow the trajectory", name="joints")
         for name in trajectory.names:
             if name not in robot.joint_names:
-                others = "" if name not in robot.joints else ", of a file by joints (--joints) that name the others"
-                raise TrajectoryError(reason_not_movable(robot, name) + others, name="joint", value=name)
+                advice = "" if name not in robot.joints else ", of a file by joints (--joints) that name the others"
+                raise TrajectoryError(reason_not_movable(robot, name) + advice, name="joint", value=name)
         check_measures(robot, trajectory)
         self.robot, self.trajectory = robot, trajectory
         self.loaded = LoadedRobot(robot, in_time(loads), trajectory.start, trajectory.stop)
         self.columns = [robot.joint_names.index(name) for name in trajectory.names]
-        resting = [name for name in robot.joint_names if name not in trajectory.names]
-        limits = robot.limits if resting else {}
-        self.resting_joints = {name: _rest(limits[name]) for name in resting}
+        resting_names = [name for name in robot.joint_names if name not in trajectory.names]
+        limits = robot.limits if resting_names else {}
+        self.resting_joints = {name: _rest(limits[name]) for name in resting_names}
         self.doubts: list[str] = []
         if given:
             warn_of_degrees(robot, trajectory)
@@ -87,10 +87,10 @@ class FollowedTrajectory:
         q = np.zeros((len(times), order + 1, len(self.robot.joint_names)))
         for name, value in self.resting_joints.items():
             q[:, 0, self.robot.joint_names.index(name)] = value
-        with warnings.catch_warnings(record=True) as caught:
+        with warnings.catch_warnings(record=True) as messages:
             warnings.simplefilter("always", SampleWarning)
             q[:, :, self.columns] = _in_blocks(lambda block: self.trajectory.derivatives(block, order), times)
-        self.doubts += [str(w.message) for w in caught if str(w.message) not in self.doubts]
+        self.doubts += [str(w.message) for w in messages if str(w.message) not in self.doubts]
         self._check_finite(q, times, QUANTITIES)
         return q
 
@@ -104,7 +104,7 @@ class FollowedTrajectory:
         TrajectoryError
             If one is not finite.
         """
-        torques = in_chunks(lambda some: self.loaded.torques(q[some], times[some], drives), len(q), (BLOCK,), axis=0)
+        torques = in_chunks(lambda chunk: self.loaded.torques(q[chunk], times[chunk], drives), len(q), (BLOCK,), axis=0)
         self._check_finite(torques, times, EFFORTS)
         return torques
 
@@ -114,9 +114,9 @@ class FollowedTrajectory:
         return self.loaded.at_changes(self.coordinates(changes, 2), drives) if len(changes) else ()
 
     def _check_finite(self, values: np.ndarray, times: np.ndarray, names: tuple[str, ...]) -> None:
-        bad = np.argwhere(~np.isfinite(values))
-        if len(bad):
-            instant, level, joint = bad[0]
+        failures = np.argwhere(~np.isfinite(values))
+        if len(failures):
+            instant, level, joint = failures[0]
             quantity = names[level] if level < len(names) else f"derivative {level} of the {names[0]}"
             message = f"the {quantity} of this joint is not finite at t = {time_text(float(times[instant]))} s"
             raise TrajectoryError(f"{message}; choose another law there", name=self.robot.joint_names[joint])
@@ -145,10 +145,10 @@ def warn_of_degrees(robot: Robot, trajectory: JointTrajectory) -> None:
         for name, law in trajectory.laws.items()
         if name in robot.joint_names and robot.joints[name].turning and name not in trajectory.measures
     }
-    if why := trajectory_doubt(
+    if doubt := trajectory_doubt(
         laws, trajectory.start, trajectory.stop, {name: robot.joints[name].limits for name in laws}
     ):
-        warnings.warn(UnitWarning(why), stacklevel=3)
+        warnings.warn(UnitWarning(doubt), stacklevel=3)
 
 
 def drives_note(drives: bool) -> str:
@@ -223,13 +223,13 @@ def trajectory_torques(
         attributes = {"units": "N*m" if robot.joints[name].turning else "N", "long_name": derivatives_of(name)}
         variables[name] = (("time", "derivative"), values[..., k], attributes)
     axes = time_axes(instants, rates + 1)
-    about = {"title": robot.name, "source": "jounce", "drives": drives_note(drives)}
-    return xarray.Dataset(variables, coords=axes, attrs=about)
+    attributes_ = {"title": robot.name, "source": "jounce", "drives": drives_note(drives)}
+    return xarray.Dataset(variables, coords=axes, attrs=attributes_)
 
 
 def _in_blocks(function: Callable[[np.ndarray], Any], values: np.ndarray) -> np.ndarray:
     """Return the results of a function for values along their first axis, in blocks of one padded size."""
-    return in_chunks(lambda some: function(values[some]), len(values), (BLOCK,), axis=0)
+    return in_chunks(lambda chunk: function(values[chunk]), len(values), (BLOCK,), axis=0)
 
 
 def reason_not_movable(robot: Robot, name: str) -> str:
@@ -244,9 +244,9 @@ def reason_not_movable(robot: Robot, name: str) -> str:
 
 def check_measures(robot: Robot, trajectory: JointTrajectory) -> None:
     """Raise TrajectoryError unless the units of a trajectory fit the joints of the robot."""
-    for name, measured in trajectory.measures.items():
+    for name, measure in trajectory.measures.items():
         turning = robot.joints[name].turning
-        if measured != ("angle" if turning else "length"):
+        if measure != ("angle" if turning else "length"):
             message = (
                 "this joint turns, its coordinate is an angle, but its law has the unit of a length"
                 if turning

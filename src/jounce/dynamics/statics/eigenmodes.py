@@ -50,9 +50,9 @@ def eigenmodes(mass: Square, damping: Square, stiffness: Square, noise: tuple[Sq
     def weighted(matrix: Square) -> Square:
         return solve_triangular(lower, solve_triangular(lower, matrix, lower=True).T, lower=True).T
 
-    reached = np.abs(solve_triangular(lower, np.eye(len(mass)), lower=True))
+    inverse = np.abs(solve_triangular(lower, np.eye(len(mass)), lower=True))
     c, k = weighted(damping), weighted(stiffness)
-    c_noise, k_noise = (_with_rounding(reached @ part @ reached.T, x) for part, x in zip(noise, (c, k), strict=True))
+    c_noise, k_noise = (_with_rounding(inverse @ eps @ inverse.T, x) for eps, x in zip(noise, (c, k), strict=True))
     if (np.abs(c) <= c_noise).all() and is_symmetric(k, k_noise):  # shapes are real
         squares, weighted_shapes = np.linalg.eigh((k + k.T) / 2)
         squares = np.where(np.abs(squares) <= _along(weighted_shapes, k_noise, weighted_shapes), 0.0, squares)
@@ -61,9 +61,9 @@ def eigenmodes(mass: Square, damping: Square, stiffness: Square, noise: tuple[Sq
     else:
         values, shapes = _of_state_matrix(c, k, c_noise, k_noise)
     shapes = shapes / np.linalg.norm(shapes, axis=0)
-    largest_at = np.argmax(np.abs(shapes) >= 0.999 * np.abs(shapes).max(axis=0, initial=0.0), axis=0)
-    largest = shapes[largest_at, np.arange(shapes.shape[1])]
-    shapes = shapes * np.conj(largest) / np.abs(largest)
+    peak_rows = np.argmax(np.abs(shapes) >= 0.999 * np.abs(shapes).max(axis=0, initial=0.0), axis=0)
+    peaks = shapes[peak_rows, np.arange(shapes.shape[1])]
+    shapes = shapes * np.conj(peaks) / np.abs(peaks)
     order = np.lexsort((np.real(values), np.abs(values)))
     vectors = solve_triangular(lower.T, shapes[:, order], lower=False)
     return Eigenmodes(values[order], vectors)
@@ -107,8 +107,8 @@ def _of_state_matrix(
     left, right = zeros(k, k_noise)
     chains = zeros(left.T @ c @ right, np.abs(left.T) @ c_noise @ np.abs(right))[1].shape[1]
     order = np.argsort(np.abs(values))
-    moving = order[right.shape[1] + chains :]
-    selected = moving[_upper(values[moving])]
+    nonzero = order[right.shape[1] + chains :]
+    selected = nonzero[_upper(values[nonzero])]
     eigenvalues = _without_rounding(values[selected])
     shapes = np.where(np.abs(np.imag(eigenvalues)) > 0, vectors[:count, selected], _real(vectors[:count, selected]))
     return np.concatenate([np.zeros(right.shape[1]), eigenvalues * rate]), np.concatenate([right, shapes], axis=1)
@@ -129,6 +129,6 @@ def _without_rounding(values: Complex[np.ndarray, " value"]) -> Complex[np.ndarr
 
 def _real(vectors: Complex[np.ndarray, "c k"]) -> Complex[np.ndarray, "c k"]:
     """Return the real multiples of vectors that are real up to a complex factor."""
-    largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(vectors.shape[1])]
-    turned = vectors * np.conj(largest) / np.where(largest == 0, 1.0, np.abs(largest))
-    return np.real(turned).astype(complex)
+    peaks = vectors[np.abs(vectors).argmax(axis=0), np.arange(vectors.shape[1])]
+    rotated = vectors * np.conj(peaks) / np.where(peaks == 0, 1.0, np.abs(peaks))
+    return np.real(rotated).astype(complex)

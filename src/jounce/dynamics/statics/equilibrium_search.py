@@ -84,18 +84,18 @@ def search(start: OperatingPoint, *, settle: bool) -> SearchResult:
     """
     point, drifted, scale = start, 0, 1.0
     for _ in range(MAX_STEPS):
-        free = point.free
-        left = free.T @ point.loads.sum(axis=0)
-        if not free.shape[1]:
-            return SearchResult(point, left, True)
+        free_directions = point.free
+        residual = free_directions.T @ point.loads.sum(axis=0)
+        if not free_directions.shape[1]:
+            return SearchResult(point, residual, True)
         stiffness = _stiffness(point)
         scale = _scale(point, stiffness)
-        step = free @ _step(left, stiffness, scale, settle=settle)
+        step = free_directions @ _step(residual, stiffness, scale, settle=settle)
         size = float(np.max(np.abs(step), initial=0.0))
         if size <= CLOSED:
             return _ended(_moved(point, step) or point, scale)
-        following = _shortened(point, step * min(1.0, LONGEST / size), left, settle=settle)
-        flat = size > LONGEST and _is_flat(stiffness, free.T @ step, left)
+        following = _shortened(point, step * min(1.0, LONGEST / size), residual, settle=settle)
+        flat = size > LONGEST and _is_flat(stiffness, free_directions.T @ step, residual)
         drifted = drifted + 1 if flat else 0
         if following is None or drifted > ADRIFT:
             break
@@ -124,8 +124,8 @@ def _scale(point: OperatingPoint, stiffness: np.ndarray) -> float:
 
 
 def _stiffness(point: OperatingPoint) -> Float[np.ndarray, "direction direction"]:
-    free = point.free
-    return free.T @ point.varied(changes_of_coordinates(free))[0].sum(axis=0)
+    directions = point.free
+    return directions.T @ point.varied(changes_of_coordinates(directions))[0].sum(axis=0)
 
 
 def _largest_load(point: OperatingPoint) -> float:
@@ -135,7 +135,7 @@ def _largest_load(point: OperatingPoint) -> float:
 
 
 def _step(
-    left: Float[np.ndarray, " direction"],
+    residual: Float[np.ndarray, " direction"],
     stiffness: Float[np.ndarray, "direction direction"],
     scale: float,
     *,
@@ -145,33 +145,33 @@ def _step(
     values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
     floor = FLAT * scale
     if values[0] > floor or not settle:
-        left_vectors, sizes, turned = np.linalg.svd(stiffness)
-        along = left_vectors.T @ left
-        parts = np.where((sizes > floor) | (np.abs(along) > WORTH * scale), along / np.maximum(sizes, floor), 0.0)
-        return -turned.T @ parts
-    along = vectors.T @ left
+        left_vectors, sizes, right_vectors = np.linalg.svd(stiffness)
+        terms = left_vectors.T @ residual
+        steps = np.where((sizes > floor) | (np.abs(terms) > WORTH * scale), terms / np.maximum(sizes, floor), 0.0)
+        return -right_vectors.T @ steps
+    terms = vectors.T @ residual
     curved = np.maximum(np.abs(values), floor)
-    return -vectors @ np.where((np.abs(values) > floor) | (np.abs(along) > WORTH * scale), along / curved, 0.0)
+    return -vectors @ np.where((np.abs(values) > floor) | (np.abs(terms) > WORTH * scale), terms / curved, 0.0)
 
 
 def _shortened(
-    point: OperatingPoint, step: Float[np.ndarray, " column"], left: Any, *, settle: bool
+    point: OperatingPoint, step: Float[np.ndarray, " column"], residual: Any, *, settle: bool
 ) -> OperatingPoint | None:
     """Return the point after a step, halved until the forces do work or balance better; None if they never do."""
     size = float(np.max(np.abs(step)))
     for _ in range(30):
         trial = _moved(point, step)
         if trial is not None:
-            after = trial.free @ (trial.free.T @ trial.loads.sum(axis=0))
-            before = point.free @ left
-            if not np.isfinite(after).all():
+            force_after = trial.free @ (trial.free.T @ trial.loads.sum(axis=0))
+            force_before = point.free @ residual
+            if not np.isfinite(force_after).all():
                 pass
             elif size <= 1e-7:
                 return trial
             elif settle:
-                if 0.5 * (before + after) @ step < 0 or not before @ step < 0:
+                if 0.5 * (force_before + force_after) @ step < 0 or not force_before @ step < 0:
                     return trial
-            elif np.linalg.norm(after) < np.linalg.norm(before):
+            elif np.linalg.norm(force_after) < np.linalg.norm(force_before):
                 return trial
         step, size = step * 0.5, size * 0.5
     return None
@@ -198,10 +198,10 @@ def check_forces(point: OperatingPoint) -> None:
         return
     pose = pose_at(point.place, point.model.pose_type).extended(None, None)
     fit = np.asarray(system.finite_forces(pose, Jet([np.full((1, 1), point.instant), np.zeros((1, 1))])))[:, 0]
-    bad = [f"forces.{name}" for name, good in zip(force_names(point.model), fit, strict=True) if not good]
-    if bad:
+    unfit = [f"forces.{name}" for name, is_finite in zip(force_names(point.model), fit, strict=True) if not is_finite]
+    if unfit:
         message = (
-            f"{', '.join(bad)}: the force has no finite value at rest, where an equilibrium is looked for; check its "
+            f"{', '.join(unfit)}: the force has no finite value at rest, where an equilibrium is looked for; check its "
             "law: a division by a velocity, as of friction, must be smoothed, for example by tanh"
         )
         raise SolveError(message, status=Status.INADMISSIBLE)
@@ -214,10 +214,10 @@ def remains(result: SearchResult) -> str:
     by_body = -(point.free @ result.left).reshape(len(model.bodies), -1)
     body = int(np.argmax(np.linalg.norm(by_body, axis=1)))
     force, moment = by_body[body, :shifts], by_body[body, shifts:]
-    pieces = []
+    phrases = []
     if np.abs(force).max() > 0.05 * np.abs(by_body[body]).max():
-        pieces.append(f"a force of ({', '.join(f'{x / model.length + 0.0:.4g}' for x in force)}) N")
+        phrases.append(f"a force of ({', '.join(f'{x / model.length + 0.0:.4g}' for x in force)}) N")
     if np.abs(moment).max() > 0.05 * np.abs(by_body[body]).max():
         inner = ", ".join(f"{x + 0.0:.4g}" for x in moment)
-        pieces.append(f"a moment of {inner if len(moment) == 1 else f'({inner})'} N m")
-    return f"{' and '.join(pieces)} on {model.bodies[body]}"
+        phrases.append(f"a moment of {inner if len(moment) == 1 else f'({inner})'} N m")
+    return f"{' and '.join(phrases)} on {model.bodies[body]}"

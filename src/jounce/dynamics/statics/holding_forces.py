@@ -87,16 +87,16 @@ def holding_forces(motion: Motion) -> "xarray.Dataset":
     joints = forces.friction.names
     if joints:
         _check_determined(forces, f"joints.{joints[0]}.friction")
-    plain = {name: forces.driver_force(name)[0, 0] for name in mechanism.drivers}
-    ranges = _ranges(forces, plain) if joints else {name: ([x, x, x], PROVEN) for name, x in plain.items()}
-    failed = motion.status != Status.OK
+    ideal = {name: forces.driver_force(name)[0, 0] for name in mechanism.drivers}
+    ranges = _ranges(forces, ideal) if joints else {name: ([x, x, x], PROVEN) for name, x in ideal.items()}
+    is_unsolved = motion.status != Status.OK
     variables = {}
     for name, (bounds, unproven) in ranges.items():
-        values = np.where(failed, np.nan, np.asarray(bounds, float)).T
+        values = np.where(is_unsolved, np.nan, np.asarray(bounds, float)).T
         attributes = {"units": "N*m" if is_turning(mechanism.drivers[name]) else "N"}
-        solved = np.flatnonzero(~failed)
-        if words := _comment(motion.time, values, np.intersect1d(unproven, solved), solved):
-            attributes["comment"] = words
+        solved = np.flatnonzero(~is_unsolved)
+        if comment := _comment(motion.time, values, np.intersect1d(unproven, solved), solved):
+            attributes["comment"] = comment
         variables[name] = (("time", "bound"), values, attributes)
     time = time_axes(motion.time, 1)["time"]
     title = {"title": mechanism.title} if mechanism.title else {}
@@ -105,22 +105,22 @@ def holding_forces(motion: Motion) -> "xarray.Dataset":
 
 def _comment(time: np.ndarray, values: np.ndarray, unproven: np.ndarray, solved: np.ndarray) -> str:
     """Return a text on the instants at which a range is infinite or not known; empty if there are none."""
-    unknown = np.isnan(values[unproven]).any(axis=1)
-    words = {
+    is_unknown = np.isnan(values[unproven]).any(axis=1)
+    cases = {
         "friction locks, no force moves it one way": np.flatnonzero(np.isinf(values).any(axis=1)),
         "forces are not determined": solved[np.isnan(values[solved, 1])],
-        "not determined, as friction locks for some of its signs": unproven[unknown],
-        "the widest that a search found, which does not prove that there is none wider": unproven[~unknown],
+        "not determined, as friction locks for some of its signs": unproven[is_unknown],
+        "the widest that a search found, which does not prove that there is none wider": unproven[~is_unknown],
     }
-    return "; ".join(f"{what}, at t = {listed(time[lanes])}" for what, lanes in words.items() if len(lanes))
+    return "; ".join(f"{phrase}, at t = {listed(time[lanes])}" for phrase, lanes in cases.items() if len(lanes))
 
 
 def _at_rest(motion: Motion) -> Motion:
     """Return a motion at rest in all positions of another motion."""
-    still = at_rest({name: values[0] for name, values in motion.poses[1].items() if name != "angular_velocity"})
+    rest_pose = at_rest({name: values[0] for name, values in motion.poses[1].items() if name != "angular_velocity"})
     nothing = tuple(() for _ in motion.model.outputs)
     return Motion(
-        motion.mechanism, motion.model, motion.time, 2, (still, nothing), motion.status, motion.faults,
+        motion.mechanism, motion.model, motion.time, 2, (rest_pose, nothing), motion.status, motion.faults,
         motion.passages, motion.history, motion.backend,
     )  # fmt: skip
 
@@ -147,7 +147,7 @@ def _check_determined(forces: MotionForces, name: str) -> None:
         )
 
 
-def _ranges(forces: MotionForces, plain: dict[str, Numbers]) -> dict[str, Any]:
+def _ranges(forces: MotionForces, ideal_forces: dict[str, Numbers]) -> dict[str, Any]:
     """Return the bounds of each driver force, and the instants at which they are not proven."""
     friction = forces.friction
     middle, responses = _about_the_middle(forces.friction, np.asarray(forces.multipliers[0]))
@@ -155,16 +155,16 @@ def _ranges(forces: MotionForces, plain: dict[str, Numbers]) -> dict[str, Any]:
     extreme = ExtremeFriction(friction.pressing(middle), changes, friction.directions(), friction.coefficients)
     columns = [_with_multipliers(forces, response) for response in responses]
     ranges = {}
-    for name, free in plain.items():
+    for name, ideal in ideal_forces.items():
         center = np.asarray(_with_multipliers(forces, middle).driver_force(name)[0, 0])
-        along = -np.array([of_one.driver_force(name)[0, 0] for of_one in columns])
-        (more, sure), (less, sure_too) = extreme.most(along), extreme.most(-along)
-        ranges[name] = [center - less, free, center + more], np.flatnonzero(~(sure & sure_too))
+        contributions = -np.array([balance.driver_force(name)[0, 0] for balance in columns])
+        (rise, rise_proven), (fall, fall_proven) = extreme.most(contributions), extreme.most(-contributions)
+        ranges[name] = [center - fall, ideal, center + rise], np.flatnonzero(~(rise_proven & fall_proven))
     return ranges
 
 
 def _about_the_middle(
-    friction: JointFriction, free: Float[np.ndarray, "row time"]
+    friction: JointFriction, ideal: Float[np.ndarray, "row time"]
 ) -> tuple[Float[np.ndarray, "row time"], Float[np.ndarray, "direction row time"]]:
     """Return multipliers with all friction in the middle of its range, and their decrease for unit friction.
 
@@ -174,17 +174,17 @@ def _about_the_middle(
     """
     responses, differences = friction.responses(), friction.differences
     if not differences.any():
-        return free, responses
+        return ideal, responses
     joints = np.array(friction.directions())
     gears = np.flatnonzero(differences[joints])  # each slips in one direction
-    share = differences[joints[gears]]
-    torques = np.array([friction.pressing(x)[joints[gears], 0].T for x in (free, *responses)])  # (.., time, gear)
-    matrix = np.einsum("gtk,g->tkg", torques[1 + gears], share) + np.eye(len(gears))
+    slopes = differences[joints[gears]]
+    torques = np.array([friction.pressing(x)[joints[gears], 0].T for x in (ideal, *responses)])  # (.., time, gear)
+    matrix = np.einsum("gtk,g->tkg", torques[1 + gears], slopes) + np.eye(len(gears))
     regular = np.abs(np.linalg.det(matrix)) > SMALLEST
     matrix = np.where(regular[:, None, None], matrix, np.nan)
-    lost = np.linalg.solve(matrix, torques[..., None])[..., 0].swapaxes(1, 2) * share[:, None]
-    middle = free - np.einsum("et,ert->rt", lost[0], responses[gears])
-    return middle, responses - np.einsum("det,ert->drt", lost[1:], responses[gears])
+    losses = np.linalg.solve(matrix, torques[..., None])[..., 0].swapaxes(1, 2) * slopes[:, None]
+    middle = ideal - np.einsum("et,ert->rt", losses[0], responses[gears])
+    return middle, responses - np.einsum("det,ert->drt", losses[1:], responses[gears])
 
 
 def _with_multipliers(forces: MotionForces, multipliers: Numbers) -> MotionForces:

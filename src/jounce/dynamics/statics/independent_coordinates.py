@@ -70,8 +70,8 @@ class Reduction:
 
     def lanes(self, level: int, *, drivers: bool = False) -> slice:
         """Return the lanes of one level of the coordinates, or of the held drivers."""
-        own, other = len(self.names), len(self.held)
-        first, count = (LEVELS * own + level * other, other) if drivers else (level * own, own)
+        n, m = len(self.names), len(self.held)
+        first, count = (LEVELS * n + level * m, m) if drivers else (level * n, n)
         return slice(first, first + count)
 
     @property
@@ -108,28 +108,28 @@ def reduced(
     MechanismError
         If a name is not that of a coordinate, or the named coordinates are not independent.
     """
-    free = point.free
-    chosen = _chosen(point, free, prefer_outputs) if names is None else tuple(names)
-    gradients = _gradients(point, chosen, free)
+    free_directions = point.free
+    chosen = _chosen(point, free_directions, prefer_outputs) if names is None else tuple(names)
+    gradients = _gradients(point, chosen, free_directions)
     driving = tuple(name for name in point.mechanism.drivers if name not in released) if drivers else ()
-    own, other = len(released) + len(chosen), len(driving)
-    laws, targets = _directions(len(released), len(chosen), other)
+    n, m = len(released) + len(chosen), len(driving)
+    laws, targets = _directions(len(released), len(chosen), m)
     rows = _laws_varied(point, (*released, *driving), laws)
     matrix = np.concatenate([point.jacobian, gradients])
     inverse = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE)
     changes = np.zeros((LEVELS, len(point.scale), targets.shape[-1]))
-    named = [name for name in chosen if name in point.output_gradients] if chosen else []
+    output_names = [name for name in chosen if name in point.output_gradients] if chosen else []
     for level in range(LEVELS):
         gaps = rows[level] + point.varied(changes)[1][level] if level else rows[level]
-        away = targets[level] - gradients @ changes[level]
-        if level and named:
-            away = targets[level] - _measured(point, chosen, changes, level)
-        changes[level] = inverse @ np.concatenate([-gaps, away])
-    parts, _ = point.varied(changes)
-    basis = changes[0][:, :own]
+        target_gaps = targets[level] - gradients @ changes[level]
+        if level and output_names:
+            target_gaps = targets[level] - _measured(point, chosen, changes, level)
+        changes[level] = inverse @ np.concatenate([-gaps, target_gaps])
+    forces, _ = point.varied(changes)
+    basis = changes[0][:, :n]
     units = [_unit_of_driver(point.mechanism, name) for name in released] + [_unit(point, name) for name in chosen]
-    matrices, sizes = basis.T @ parts.sum(axis=0), np.abs(basis).T @ np.abs(parts).sum(axis=0)
-    sizes[:, : 2 * own] += np.concatenate(_magnitudes(point, basis), axis=1)
+    matrices, sizes = basis.T @ forces.sum(axis=0), np.abs(basis).T @ np.abs(forces).sum(axis=0)
+    sizes[:, : 2 * n] += np.concatenate(_magnitudes(point, basis), axis=1)
     if rolls(point):
         _check_nowhere(point, (*released, *chosen), (gradients, inverse, basis, sizes.max(axis=1)), len(released))
     return Reduction(point, (*released, *chosen), tuple(units), tuple(released), driving, changes, matrices, sizes)
@@ -156,10 +156,10 @@ def _check_nowhere(
     changes = changes_of_coordinates(directions)
     for level in (1, 2):
         gaps = point.varied(changes)[1][level]
-        measured = _measured(point, chosen, changes, level) if chosen else np.zeros((0, gaps.shape[1]))
-        changes[level] = inverse @ np.concatenate([-gaps, -measured])
-    left = basis.T @ point.varied(changes)[0].sum(axis=0)
-    if released or (np.abs(left) > NOWHERE * sizes[:, None]).any():
+        output_changes = _measured(point, chosen, changes, level) if chosen else np.zeros((0, gaps.shape[1]))
+        changes[level] = inverse @ np.concatenate([-gaps, -output_changes])
+    unbalanced = basis.T @ point.varied(changes)[0].sum(axis=0)
+    if released or (np.abs(unbalanced) > NOWHERE * sizes[:, None]).any():
         message = (
             "small motions of wheels that roll are known where they do not depend on the places that wheels have "
             "rolled to: name coordinates that determine the motion of bodies for any heading, release no driver, and "
@@ -180,8 +180,8 @@ def _magnitudes(point: OperatingPoint, basis: Float[np.ndarray, "column coordina
             for name in ("position", "angle" if point.model.pose_type.turns == 1 else "angular_velocity")]  # fmt: skip
     speed = np.abs(rate[0]).max(axis=0) / point.model.length + np.abs(np.atleast_2d(rate[1])).max(axis=0)
     mass = np.abs(point.masses).max(axis=(0, 1))
-    moved = np.linalg.norm(basis.reshape(bodies, -1, basis.shape[1]), axis=1)
-    return [np.einsum("b,bi,bj->ij", weight, moved, moved) for weight in (load, mass * speed)]
+    displacements = np.linalg.norm(basis.reshape(bodies, -1, basis.shape[1]), axis=1)
+    return [np.einsum("b,bi,bj->ij", weight, displacements, displacements) for weight in (load, mass * speed)]
 
 
 def with_joints(reduction: Reduction, names: Sequence[str]) -> Reduction:
@@ -200,36 +200,36 @@ def chosen_outputs(point: OperatingPoint) -> tuple[str, ...]:
 
 
 def _chosen(
-    point: OperatingPoint, free: Float[np.ndarray, "column direction"], prefer_outputs: bool
+    point: OperatingPoint, directions: Float[np.ndarray, "column direction"], prefer_outputs: bool
 ) -> tuple[str, ...]:
     """Return well-conditioned independent coordinates, chosen by pivoting on the largest remaining row."""
     if prefer_outputs:
         names = list(point.output_gradients)
-        rows = np.array([point.output_gradients[name] for name in names]).reshape(-1, len(free)) @ free
+        rows = np.array([point.output_gradients[name] for name in names]).reshape(-1, len(directions)) @ directions
         rows = rows / np.array([1.0 if _unit(point, name) == "rad" else point.model.length for name in names])[:, None]
     else:
         names = column_names(point)
         width = len(COLUMNS[point.mechanism.space])
         turns = np.arange(width) >= point.model.pose_type.shifts
-        rows = free * np.tile(np.where(turns, 1.0, SHIFT), len(point.model.bodies))[:, None]
+        rows = directions * np.tile(np.where(turns, 1.0, SHIFT), len(point.model.bodies))[:, None]
         if rolls(point):  # the axes of a turning wheel differ at every instant
             spin = np.abs(point.coordinates["angular_velocity"][0, :, 1:, 0]).max(axis=0)
             rows[np.repeat(spin > NOWHERE * spin.max(initial=0.0), width)] *= 1e-3
     columns: list[int] = []
-    left = rows.copy()
-    for _ in range(free.shape[1]):
-        lengths = np.linalg.norm(left, axis=1)
+    remaining = rows.copy()
+    for _ in range(directions.shape[1]):
+        lengths = np.linalg.norm(remaining, axis=1)
         if not lengths.max(initial=0.0) > 1e-6:
             raise MechanismError("do not determine how all bodies move; name coordinates of bodies", name="outputs")
-        longest = int(np.argmax(lengths >= TIE * lengths.max()))
-        direction = left[longest] / lengths[longest]
-        left = left - np.outer(left @ direction, direction)
-        columns.append(longest)
+        row = int(np.argmax(lengths >= TIE * lengths.max()))
+        direction = remaining[row] / lengths[row]
+        remaining = remaining - np.outer(remaining @ direction, direction)
+        columns.append(row)
     return tuple(names[k] for k in sorted(columns))
 
 
 def _gradients(
-    point: OperatingPoint, names: Sequence[str], free: Float[np.ndarray, "column direction"]
+    point: OperatingPoint, names: Sequence[str], directions: Float[np.ndarray, "column direction"]
 ) -> Float[np.ndarray, "coordinate column"]:
     """Return the gradients of named coordinates with respect to the scaled coordinates of the bodies.
 
@@ -247,16 +247,16 @@ def _gradients(
         check_name("coordinate", name, (*columns, *point.output_gradients), MechanismError, name="coordinates")
         rows.append(point.output_gradients[name])
     gradients = np.array(rows).reshape(-1, len(columns))
-    count = free.shape[1]
+    count = directions.shape[1]
     if len(names) != count or len(set(names)) != len(names):
         noun = "coordinate is" if count == 1 else "coordinates are"
         message = f"{count} independent {noun} needed besides those of released drivers; one name for each"
         raise MechanismError(message, name="coordinates", value=list(names))
     if count:
         sizes = np.array([1.0 if _unit(point, name) == "rad" else point.model.length for name in names])
-        values = np.linalg.svd(gradients @ free / sizes[:, None], compute_uv=False)
+        values = np.linalg.svd(gradients @ directions / sizes[:, None], compute_uv=False)
         if not values.min() > 1e-6:
-            suggested = ", ".join(_chosen(point, free, False))
+            suggested = ", ".join(_chosen(point, directions, False))
             message = f"are not independent here, and do not determine the motion of all bodies; use {suggested}"
             raise MechanismError(message, name="coordinates", value=list(names))
     return gradients
@@ -264,15 +264,15 @@ def _gradients(
 
 def _directions(released: int, chosen: int, driving: int) -> tuple[np.ndarray, np.ndarray]:
     """Return Taylor coefficients of laws, (3, drivers, lanes), and of other coordinates, for a unit of each level."""
-    own = released + chosen
-    lanes = LEVELS * (own + driving)
+    n = released + chosen
+    lanes = LEVELS * (n + driving)
     laws, targets = np.zeros((LEVELS, released + driving, lanes)), np.zeros((LEVELS, chosen, lanes))
     for level in range(LEVELS):
         unit = 1 / math.factorial(level)
-        for k in range(own):
-            (laws if k < released else targets)[level, k if k < released else k - released, level * own + k] = unit
+        for k in range(n):
+            (laws if k < released else targets)[level, k if k < released else k - released, level * n + k] = unit
         for k in range(driving):
-            laws[level, released + k, LEVELS * own + level * driving + k] = unit
+            laws[level, released + k, LEVELS * n + level * driving + k] = unit
     return laws, targets
 
 

@@ -29,21 +29,21 @@ def kinked(reduction: Reduction) -> list[str]:
         changes = point.changes(columns * step)
         return [np.asarray(x) for x in sizes_of_forces(point.equations, point.coordinates, point.clock, changes)]
 
-    at_rest, bends = forces(0.0), []
+    rest_forces, bends = forces(0.0), []
     for step in STEPS:
-        pairs = zip(forces(step), at_rest, forces(-step), strict=True)
+        pairs = zip(forces(step), rest_forces, forces(-step), strict=True)
         bends.append(
             [(np.abs(a - 2 * b + c) / step, np.maximum(np.abs(a - b), np.abs(b - c)) / step) for a, b, c in pairs]
         )
     names = []
-    for group, members, large, small in zip(point.equations.system.forces, point.model.forces, *bends, strict=True):
+    for group, members, coarse, fine in zip(point.equations.system.forces, point.model.forces, *bends, strict=True):
         lever = point.model.length if group.element.unit == "N" else 1.0
-        slope = small[1].max(axis=2, keepdims=True)  # the steepest, which multiplies rounding of positions
-        bent = (small[0] > BENT * large[0]) & (small[0] > FAINT * slope) & (small[0] * lever > counts)
+        slope = fine[1].max(axis=2, keepdims=True)  # the steepest, which multiplies rounding of positions
+        bent = (fine[0] > BENT * coarse[0]) & (fine[0] > FAINT * slope) & (fine[0] * lever > counts)
         # a difference that grows as the step shrinks is a jump, or rounding if it is small
-        bent &= (small[0] < large[0] / BENT) | (small[0] * STEPS[1] * lever > COUNTS * np.abs(point.loads).max())
-        bad = (bent | ~np.isfinite(small[0])).any(axis=(0, 2))
-        names += [name for name, is_bad in zip(members, bad, strict=True) if is_bad]
+        bent &= (fine[0] < coarse[0] / BENT) | (fine[0] * STEPS[1] * lever > COUNTS * np.abs(point.loads).max())
+        has_kink = (bent | ~np.isfinite(fine[0])).any(axis=(0, 2))
+        names += [name for name, is_kinked in zip(members, has_kink, strict=True) if is_kinked]
     return names
 
 

@@ -79,9 +79,9 @@ def equilibria(
         if point is None:
             continue
         for settle in (True, False):
-            ended = search(point, settle=settle)
-            if ended.balanced and not any(_same(ended.point, known.point) for known in results):
-                results.append(equilibrium_of(ended, start, of_robot=robot is not None))
+            outcome = search(point, settle=settle)
+            if outcome.balanced and not any(_same(outcome.point, result.point) for result in results):
+                results.append(equilibrium_of(outcome, start, of_robot=robot is not None))
     order = ("stable", "held", "indifferent", "undetermined", "unstable")
     return tuple(sorted(results, key=lambda one: order.index(one.stability)))
 
@@ -96,13 +96,13 @@ def _random_coordinates(
 ) -> Coordinates:
     """Return the positions of the bodies of a robot for random coordinates of the joints that are not held."""
     values, limits = given_coordinates(robot, q), robot.limits
-    fixed = robot.joint_names if hold == "all" else (hold,) if isinstance(hold, str) else hold
+    held_joints = robot.joint_names if hold == "all" else (hold,) if isinstance(hold, str) else hold
     for k, name in enumerate(robot.joint_names):
         joint = robot.joints[name]
         reach = np.pi if joint.turning else start.model.length
         ends = (limits[name].lower, limits[name].upper)
-        low, high = (own if own is not None else reach * sign for own, sign in zip(ends, (-1, 1), strict=True))
-        if name not in fixed:
+        low, high = (limit if limit is not None else reach * sign for limit, sign in zip(ends, (-1, 1), strict=True))
+        if name not in held_joints:
             values[k] = random.uniform(low, high)
     opened = robot.opened().mechanism(values, drives=drives)
     return {name: np.asarray(x) for name, x in build(opened).guess.items()}
@@ -119,19 +119,19 @@ def _random_poses(start: OperatingPoint, random: np.random.Generator) -> Coordin
 
 def _closed(start: OperatingPoint, coordinates: Coordinates) -> OperatingPoint | None:
     """Return the mechanism assembled from a position, or None if that fails or reverses a part."""
-    system, closed = start.model.system, start.closed(coordinates)
-    if closed is None or not np.array_equal(axis_signs(system, closed), axis_signs(system, start.place)):
+    system, assembled = start.model.system, start.closed(coordinates)
+    if assembled is None or not np.array_equal(axis_signs(system, assembled), axis_signs(system, start.place)):
         return None
-    return rest_point(start.mechanism, start.model, closed, start.instant)
+    return rest_point(start.mechanism, start.model, assembled, start.instant)
 
 
-def _same(one: OperatingPoint, other: OperatingPoint) -> bool:
+def _same(first: OperatingPoint, second: OperatingPoint) -> bool:
     """Return whether two positions are equal up to rounding; revolutions count only if a force depends on them."""
-    a, b = one.coordinates, other.coordinates
-    if np.abs(a["position"][0] - b["position"][0]).max() > SAME * one.model.length:
+    a, b = first.coordinates, second.coordinates
+    if np.abs(a["position"][0] - b["position"][0]).max() > SAME * first.model.length:
         return False
     if "angle" in a:
-        turned = np.abs(np.sin((a["angle"][0] - b["angle"][0]) / 2)).max() > SAME
+        is_turned = np.abs(np.sin((a["angle"][0] - b["angle"][0]) / 2)).max() > SAME
     else:
-        turned = (1 - np.abs((a["quaternion"][0] * b["quaternion"][0]).sum(axis=0))).max() > SAME**2
-    return not turned and bool(np.abs(one.loads - other.loads).max() <= SAME * load_scale(one))
+        is_turned = (1 - np.abs((a["quaternion"][0] * b["quaternion"][0]).sum(axis=0))).max() > SAME**2
+    return not is_turned and bool(np.abs(first.loads - second.loads).max() <= SAME * load_scale(first))

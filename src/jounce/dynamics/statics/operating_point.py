@@ -75,8 +75,8 @@ class OperatingPoint:
 
     @cached_property
     def _loads_and_jacobian(self) -> tuple[np.ndarray, np.ndarray]:
-        parts, jacobian = loads_at(self.equations, self.coordinates, self.clock)
-        return np.asarray(parts), np.asarray(jacobian)
+        loads, jacobian = loads_at(self.equations, self.coordinates, self.clock)
+        return np.asarray(loads), np.asarray(jacobian)
 
     @property
     def loads(self) -> Float[np.ndarray, "2 column"]:
@@ -115,9 +115,9 @@ class OperatingPoint:
             sizes = sizes_of_forces(self.equations, self.coordinates, self.clock, unchanged)
             for group, size in zip(groups, sizes, strict=True):
                 lever = self.model.length if group.element.unit == "N" else 1.0
-                own = np.abs(np.asarray(size)).max(axis=(0, 2)) * lever
+                body_force = np.abs(np.asarray(size)).max(axis=(0, 2)) * lever
                 for bodies in group.bodies:
-                    np.add.at(sums, list(bodies), own)
+                    np.add.at(sums, list(bodies), body_force)
         return sums[1:]
 
     def _balancing(self, load: Float[np.ndarray, " column"]) -> Float[np.ndarray, " row"]:
@@ -144,8 +144,8 @@ class OperatingPoint:
     ) -> Float[np.ndarray, "level coordinate all lane"]:
         """Return scaled changes as shifts, m, and rotations, rad, of all bodies, the ground first."""
         count = len(self.model.system.column_scale)
-        parts = (columns * self.scale[:, None]).reshape(len(columns), -1, count, columns.shape[-1])
-        return np.pad(np.swapaxes(parts, 1, 2), ((0, 0), (0, 0), (1, 0), (0, 0)))
+        by_body = (columns * self.scale[:, None]).reshape(len(columns), -1, count, columns.shape[-1])
+        return np.pad(np.swapaxes(by_body, 1, 2), ((0, 0), (0, 0), (1, 0), (0, 0)))
 
     def varied(self, columns: Lanes) -> tuple[Float[np.ndarray, "3 column lane"], Float[np.ndarray, "3 row lane"]]:
         """Return the variations of loads, constraint forces and rows with changes of the scaled coordinates."""

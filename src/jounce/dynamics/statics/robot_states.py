@@ -46,25 +46,25 @@ def as_held_mechanism(
     names = robot.joint_names if hold == "all" else (hold,) if isinstance(hold, str) else tuple(hold)
     for name in names:
         check_name("moving joint", name, robot.joint_names, RobotError, name="hold")
-    given = dict(torques or {})
-    for name, value in given.items():
+    constant_torques = dict(torques or {})
+    for name, value in constant_torques.items():
         check_name("moving joint", name, robot.joint_names, RobotError, name="torques")
         if name in names:
             raise RobotError("this joint is held; its torque follows", name=f"torques.{name}", value=value)
         if not np.isfinite(float(floats(f"torques.{name}", value))):
             raise RobotError("must be finite", name=f"torques.{name}", value=value)
-    parts = RobotParts(robot, {*names, *given}, None, None, drives)
+    elements = RobotParts(robot, {*names, *constant_torques}, None, None, drives)
     order = [joint.name for joint in robot.moving_joints]
     forces: dict[str, Any] = {}
-    for name, value in given.items():
-        at, law = parts.joint_placement(order.index(name)), repr(float(value))
-        if at.turning:
+    for name, value in constant_torques.items():
+        place, law = elements.joint_placement(order.index(name)), repr(float(value))
+        if place.turning:
             forces[f"{name}_torque"] = SpatialTorque(
-                at.bodies, axis_i=at.axis_i, law=law, vector_i=at.vector_i, vector_j=at.vector_j
+                place.bodies, axis_i=place.axis_i, law=law, vector_i=place.vector_i, vector_j=place.vector_j
             )
         else:
             forces[f"{name}_force"] = SlideForce(
-                at.bodies, point_i=at.point, point_j=np.zeros(3), vector_i=at.axis_i, law=law
+                place.bodies, point_i=place.point, point_j=np.zeros(3), vector_i=place.axis_i, law=law
             )
     drivers = {name: float(start[robot.joint_names.index(name)]) for name in names}
     return robot.mechanism(start, drivers=drivers, forces=forces, drives=drives)
@@ -116,14 +116,14 @@ def _levels(robot: Robot, state: GivenState) -> Float[np.ndarray, "3 joint"]:
     """Return coordinates, rates and second derivatives, zero by default."""
     count = len(robot.joint_names)
     values = robot.coordinates(**state) if isinstance(state, Mapping) else np.zeros(count) if state is None else state
-    given = np.atleast_2d(np.asarray(floats("q", in_order("q", values, robot.joint_names, RobotError))))
-    if given.ndim != 2 or given.shape[1] != count or not 1 <= len(given) <= 3:
-        shown = f"not {given.shape if len(given) > 1 else given.shape[1:]}"
-        message = f"must have the shape (n,), or (k, n) with q, q' and q'' for k to 3, n = {count}, {shown}"
+    array = np.atleast_2d(np.asarray(floats("q", in_order("q", values, robot.joint_names, RobotError))))
+    if array.ndim != 2 or array.shape[1] != count or not 1 <= len(array) <= 3:
+        shape_text = f"not {array.shape if len(array) > 1 else array.shape[1:]}"
+        message = f"must have the shape (n,), or (k, n) with q, q' and q'' for k to 3, n = {count}, {shape_text}"
         raise RobotError(message, name="q")
-    if not np.isfinite(given).all():
+    if not np.isfinite(array).all():
         raise RobotError("must be finite", name="q")
-    return np.concatenate([given, np.zeros((3 - len(given), count))])
+    return np.concatenate([array, np.zeros((3 - len(array), count))])
 
 
 def _independent(robot: Robot, q: Float[np.ndarray, " joint"]) -> tuple[str, ...]:

@@ -42,12 +42,12 @@ def stability_of(stiffness: Square, noise: Square, damping: Square, damping_nois
     brakes = np.linalg.eigvalsh((damping + damping.T) / 2)[0] >= -np.max(damping_noise)
     if conservative and brakes and is_symmetric(damping, damping_noise):
         values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
-        bound = np.einsum("ik,ij,jk->k", np.abs(vectors), noise, np.abs(vectors))
-        bound = bound + 4 * EPSILON * np.abs(values).max()
+        error_bounds = np.einsum("ik,ij,jk->k", np.abs(vectors), noise, np.abs(vectors))
+        error_bounds = error_bounds + 4 * EPSILON * np.abs(values).max()
         first = vectors[:, 0] * np.sqrt(np.diag(even))
-        if values[0] < -bound[0]:
+        if values[0] < -error_bounds[0]:
             return Verdict("unstable", "energy falls", first)
-        if values[0] <= bound[0]:
+        if values[0] <= error_bounds[0]:
             return Verdict("indifferent", "no stiffness", first)
         return Verdict("stable", "energy rises in all directions")
     return _by_eigenvalues(stiffness, noise, damping, damping_noise, mass)
@@ -69,12 +69,12 @@ def _by_eigenvalues(stiffness: Square, noise: Square, damping: Square, damping_n
     except np.linalg.LinAlgError:
         return Verdict("undetermined", "the forces have no energy, and bodies that can move have no mass")
     growth = np.real(modes.eigenvalues)
-    worst = int(np.argmax(growth))
-    bound = DECAY * np.abs(modes.eigenvalues).max()
-    if growth[worst] > bound:
-        return Verdict("unstable", "small motions grow", modes.shapes[:, worst])
+    index = int(np.argmax(growth))
+    threshold = DECAY * np.abs(modes.eigenvalues).max()
+    if growth[index] > threshold:
+        return Verdict("unstable", "small motions grow", modes.shapes[:, index])
     if np.any(modes.eigenvalues == 0):
         return Verdict("indifferent", "no stiffness", modes.shapes[:, 0])
-    if growth[worst] < -bound:
+    if growth[index] < -threshold:
         return Verdict("stable", "small motions die away")
     return Verdict("undetermined", "small motions neither grow nor die away, and the forces have no energy")

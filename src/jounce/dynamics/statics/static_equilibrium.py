@@ -94,13 +94,13 @@ class Equilibrium(Displayed):
         if verdict.direction is None:
             return verdict.reason
         direction = self._reduction.basis @ verdict.direction
-        moving = freely_moving(self.point.model, np.abs(direction)[None])
+        body_names = freely_moving(self.point.model, np.abs(direction)[None])
         tail = {"energy falls": "in motions of {}", "no stiffness": "resists motions of {}"}.get(
             verdict.reason, "those of {}"
         )
         start = {"no stiffness": "no force", "energy falls": "energy falls"}.get(verdict.reason, verdict.reason)
         separator = ": " if tail.startswith("those") else " "
-        return f"{start}{separator}{tail.format(moving)}"
+        return f"{start}{separator}{tail.format(body_names)}"
 
     @cached_property
     def cautions(self) -> tuple[str, ...]:
@@ -121,10 +121,10 @@ class Equilibrium(Displayed):
         rubbing = [name for name, joint in self.mechanism.joints.items() if getattr(joint, "friction", None)]
         if not rubbing or not self.degrees_of_freedom:
             return ()
-        others = f" and {len(rubbing) - 1} more" if len(rubbing) > 1 else ""
-        where = f"joints.{rubbing[0]}{others}"
+        more_text = f" and {len(rubbing) - 1} more" if len(rubbing) > 1 else ""
+        joints = f"joints.{rubbing[0]}{more_text}"
         return (
-            f"friction of {where} does not stick: slower than its speed it is viscous; dry, it could hold elsewhere",
+            f"friction of {joints} does not stick: slower than its speed it is viscous; dry, it could hold elsewhere",
         )
 
     @cached_property
@@ -158,8 +158,8 @@ class Equilibrium(Displayed):
     def motion(self) -> Motion:
         """The mechanism at rest, as a motion of one instant, of order 2."""
         point, model = self.point, self.point.model
-        lost = lost_orders(self.mechanism.outputs.values())
-        coordinates = {name: _padded(x, lost) for name, x in point.coordinates.items()}
+        extra_orders = lost_orders(self.mechanism.outputs.values())
+        coordinates = {name: _padded(x, extra_orders) for name, x in point.coordinates.items()}
         groups = output_values(model.system.outputs, coordinates, model.pose_type)
         status = np.array([int(Status.OK)])
         return Motion(self.mechanism, model, np.array([self.time]), 2, (coordinates, groups), status, {})
@@ -309,8 +309,8 @@ def as_mechanism(
     """
     if isinstance(subject, Robot):
         return as_held_mechanism(subject, q, hold, torques, flag("drives", drives, error=RobotError))
-    given = {"q": q, "hold": hold or None, "torques": torques}
-    if unfit := [k for k, v in given.items() if v is not None]:
+    robot_arguments = {"q": q, "hold": hold or None, "torques": torques}
+    if unfit := [k for k, v in robot_arguments.items() if v is not None]:
         raise MechanismError("is for robots; a mechanism has its own guess, drivers and forces", name=unfit[0])
     return subject
 
@@ -376,7 +376,7 @@ def equilibrium_of(result: SearchResult, start: OperatingPoint, *, of_robot: boo
     """
     singular = result.point.free.shape[1] > start.free.shape[1]
     coordinates = {"position": result.point.coordinates["position"][0]}
-    if beyond := beyond_end(ends_of(result.point.model), coordinates):
-        message = f"bodies would come to rest only beyond an end of a curve, {beyond}: {Status.END_OF_CURVE.advice}"
+    if excess := beyond_end(ends_of(result.point.model), coordinates):
+        message = f"bodies would come to rest only beyond an end of a curve, {excess}: {Status.END_OF_CURVE.advice}"
         raise SolveError(message, status=Status.END_OF_CURVE)
     return Equilibrium(result.point, singular, of_robot=of_robot)

@@ -47,8 +47,8 @@ def loads_at(equations: Equations, coordinates: Coordinates, clock: Clock) -> tu
     """
     pose, time = _moving(equations, coordinates), Jet(tuple(clock))
     system = equations.system
-    parts = jnp.stack(_loads(equations, pose, time))[:, :, 1:, 0]
-    return parts, system.jacobian(pose.truncate(0), time.truncate(0))[..., 0]
+    loads = jnp.stack(_loads(equations, pose, time))[:, :, 1:, 0]
+    return loads, system.jacobian(pose.truncate(0), time.truncate(0))[..., 0]
 
 
 @compiled()
@@ -85,11 +85,13 @@ def variations(
     """
     pose, time = _moving(equations, coordinates), Jet(tuple(clock))
 
-    def evaluated(moved: Pose) -> tuple[Any, Any]:
-        forces = jnp.stack([*_loads(equations, moved, time), _constraint_wrenches(equations, moved, time, multipliers)])
-        return forces[:, :, 1:, 0], stacked(equations.system.residual(moved, time))[..., 0]
+    def forces_and_rows(varied: Pose) -> tuple[Any, Any]:
+        forces = jnp.stack(
+            [*_loads(equations, varied, time), _constraint_wrenches(equations, varied, time, multipliers)]
+        )
+        return forces[:, :, 1:, 0], stacked(equations.system.residual(varied, time))[..., 0]
 
-    return jax.vmap(lambda change: jax.jvp(evaluated, (pose,), (_tangent(pose, change),))[1], -1, -1)(changes)
+    return jax.vmap(lambda change: jax.jvp(forces_and_rows, (pose,), (_tangent(pose, change),))[1], -1, -1)(changes)
 
 
 @compiled()
@@ -107,10 +109,10 @@ def output_variations(
     """Return the Taylor coefficients of the variations of outputs with changes of a motion."""
     pose: Any = movable(pose_of(coordinates, pose_type))
 
-    def evaluated(moved: Pose) -> tuple[Any, ...]:
-        return tuple(stacked(group.evaluate(moved))[..., 0] for group in groups)
+    def output_series(varied: Pose) -> tuple[Any, ...]:
+        return tuple(stacked(group.evaluate(varied))[..., 0] for group in groups)
 
-    return jax.vmap(lambda change: jax.jvp(evaluated, (pose,), (_tangent(pose, change),))[1], -1, -1)(changes)
+    return jax.vmap(lambda change: jax.jvp(output_series, (pose,), (_tangent(pose, change),))[1], -1, -1)(changes)
 
 
 @compiled("order")
@@ -134,12 +136,12 @@ def law_variations(
     """
     pose, time = _moving(equations, coordinates), Jet(tuple(clock))
 
-    def evaluated(change: Any) -> Any:
+    def residuals(change: Any) -> Any:
         system = with_changes(equations.system, order, change[..., None])
         return stacked(system.residual(pose, time))[..., 0]
 
     zeros = jnp.zeros(changes.shape[:-1])
-    return jax.vmap(lambda change: jax.jvp(evaluated, (zeros,), (change,))[1], -1, -1)(changes)
+    return jax.vmap(lambda change: jax.jvp(residuals, (zeros,), (change,))[1], -1, -1)(changes)
 
 
 @compiled()
@@ -147,13 +149,13 @@ def reaches(equations: Equations, coordinates: Coordinates, clock: Clock, change
     """Return the displacements conjugate to each applied force for changes, (components, instances, lanes)."""
     pose, time = _moving(equations, coordinates), Jet(tuple(clock)).truncate(0)
 
-    def along(change: Any) -> tuple[Any, ...]:
+    def conjugates(change: Any) -> tuple[Any, ...]:
         varied = _tangent(pose, change).truncate(1)
-        at_rest = pose.truncate(1)
+        rest_pose = pose.truncate(1)
         groups = equations.system.forces
-        return tuple(group.variation(at_rest, varied, time).coefficients[0][..., 0] for group in groups)
+        return tuple(group.variation(rest_pose, varied, time).coefficients[0][..., 0] for group in groups)
 
-    return jax.vmap(along, -1, -1)(changes)
+    return jax.vmap(conjugates, -1, -1)(changes)
 
 
 @compiled()
@@ -163,15 +165,15 @@ def sizes_of_forces(
     """Return the applied forces after small changes of positions and velocities."""
     pose, time = _moving(equations, coordinates), Jet(tuple(clock)).truncate(1)
 
-    def at(change: Any) -> tuple[Any, ...]:
-        parts = [(c[: pose.shifts, :, None], c[pose.shifts :, :, None]) for c in change]
-        moved = pose.truncate(0).displaced(*parts[0])
-        shift = pose.position.coefficients[1] + parts[1][0]
+    def forces_after(change: Any) -> tuple[Any, ...]:
+        levels = [(c[: pose.shifts, :, None], c[pose.shifts :, :, None]) for c in change]
+        varied = pose.truncate(0).displaced(*levels[0])
+        shift = pose.position.coefficients[1] + levels[1][0]
         spin = pose.angle.coefficients[1][None] if pose.turns == 1 else pose.angular_velocity.coefficients[0]
-        moved = moved.extended(shift, spin + parts[1][1])
-        return tuple(group.force(moved, time).coefficients[0][..., 0] for group in equations.system.forces)
+        varied = varied.extended(shift, spin + levels[1][1])
+        return tuple(group.force(varied, time).coefficients[0][..., 0] for group in equations.system.forces)
 
-    return jax.vmap(at, -1, -1)(changes)
+    return jax.vmap(forces_after, -1, -1)(changes)
 
 
 @compiled()
@@ -220,11 +222,11 @@ def _loads(equations: Equations, pose: Pose, time: Jet) -> tuple[Any, Any]:
 
 def _constraint_wrenches(equations: Equations, pose: Pose, time: Jet, multipliers: Float[Numbers, "row 1"]) -> Any:
     """Return ``Phi_q^T lambda`` with joint friction for all bodies: the negative wrenches of the joints."""
-    system, now = equations.system, time.truncate(0)
-    friction = FreeFriction(system, pose.truncate(1), now)
+    system, instant = equations.system, time.truncate(0)
+    friction = FreeFriction(system, pose.truncate(1), instant)
 
     def loosened(change: Any) -> Any:
-        return [system.variation(pose.truncate(0), change, now).coefficients[0], *friction.slips(change)]
+        return [system.variation(pose.truncate(0), change, instant).coefficients[0], *friction.slips(change)]
 
     weights = [multipliers]
     if friction.groups:
@@ -234,6 +236,6 @@ def _constraint_wrenches(equations: Equations, pose: Pose, time: Jet, multiplier
 
 def _tangent(pose: Pose, change: Float[Numbers, "level coordinate body"]) -> Any:
     """Return the change of a pose from the Taylor coefficients of shifts and rotations."""
-    parts = change[..., None]
-    shift, turn = Jet(tuple(parts[:, : pose.shifts])), Jet(tuple(parts[:, pose.shifts :]))
+    coefficients = change[..., None]
+    shift, turn = Jet(tuple(coefficients[:, : pose.shifts])), Jet(tuple(coefficients[:, pose.shifts :]))
     return movable(pose.varied(shift, turn))

@@ -75,8 +75,8 @@ class Linearization(Displayed):
 
     def __repr__(self) -> str:
         title = f"{self.mechanism.title}: " if self.mechanism.title else ""
-        where = "a motion" if self.equilibrium is None else f"an equilibrium that is {self.equilibrium.stability}"
-        return f"<Linearization {title}{', '.join(self.coordinates)} about {where} at {self.time:g} s>"
+        reference = "a motion" if self.equilibrium is None else f"an equilibrium that is {self.equilibrium.stability}"
+        return f"<Linearization {title}{', '.join(self.coordinates)} about {reference} at {self.time:g} s>"
 
     @cached_property
     def modes(self) -> Modes:
@@ -86,11 +86,11 @@ class Linearization(Displayed):
     @cached_property
     def _inputs(self) -> tuple[tuple[str, ...], Float[np.ndarray, "coordinate input"]]:
         reduction, point = self._reduction, self._reduction.point
-        own = len(self.coordinates)
+        count = len(self.coordinates)
         names, columns = [], []
         for k, name in enumerate(reduction.released):
             names.append(name)
-            columns.append(np.eye(own)[k])
+            columns.append(np.eye(count)[k])
         if self._by_forces and point.equations.system.forces:
             changes = point.changes(reduction.changes[:, :, reduction.lanes(0)])
             forces = reaches(point.equations, point.coordinates, point.clock, changes)
@@ -104,7 +104,7 @@ class Linearization(Displayed):
             }
             ranks = [order[name if name in order else name[:-2]] for name in names]
             names, columns = ([x[k] for k in np.argsort(ranks, kind="stable")] for x in (names, columns))
-        return tuple(names), np.array(columns).reshape(-1, own).T
+        return tuple(names), np.array(columns).reshape(-1, count).T
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -148,9 +148,9 @@ class Linearization(Displayed):
         ([[0.0, 1.0], [-9.81, -0.0]], ('angle', 'angle_d1'))
         """
         names = self.inputs if inputs is None else named("inputs", inputs)
-        known = (*self.inputs, *self.held)
+        input_names = (*self.inputs, *self.held)
         for name in names:
-            check_name("input", name, known, MechanismError, name="inputs")
+            check_name("input", name, input_names, MechanismError, name="inputs")
         forces = [name for name in names if name in self.inputs]
         drivers = [name for name in names if name not in self.inputs]
         return _state_space(self, names, forces, drivers, None if outputs is None else named("outputs", outputs))
@@ -186,39 +186,42 @@ def named(kind: str, names: str | Sequence[str] | Refused) -> tuple[str, ...]:
 
 
 def _state_space(
-    of: Linearization,
+    system: Linearization,
     inputs: Sequence[str],
     forces: Sequence[str],
     drivers: Sequence[str],
     outputs: tuple[str, ...] | None,
 ) -> StateSpace:
     """Return the state space, in which a driver acts by the generalized forces of its change and two rates."""
-    r, own, other = of._reduction, len(of.coordinates), len(drivers)
+    r, n, m = system._reduction, len(system.coordinates), len(drivers)
     chosen = [r.held.index(name) for name in drivers]
     by_law = [-r.matrices[:, r.lanes(level, drivers=True)][:, chosen] for level in range(3)]
-    by_force = of.input_matrix[:, [of.inputs.index(name) for name in forces]]
+    by_force = system.input_matrix[:, [system.inputs.index(name) for name in forces]]
     # second derivatives of the coordinates by coordinates, laws, their rates, and inputs
-    right = np.concatenate([-of.stiffness, by_law[0], -of.damping, by_law[1], by_force, by_law[2]], axis=1)
-    second = np.linalg.solve(of.mass, right) if own else right
-    size = own + other
+    right = np.concatenate([-system.stiffness, by_law[0], -system.damping, by_law[1], by_force, by_law[2]], axis=1)
+    second = np.linalg.solve(system.mass, right) if n else right
+    size = n + m
     a, b = np.zeros((2 * size, 2 * size)), np.zeros((2 * size, len(inputs)))
     a[:size, size:] = np.eye(size)
-    a[size : size + own] = second[:, : 2 * size]
+    a[size : size + n] = second[:, : 2 * size]
     columns = [inputs.index(name) for name in (*forces, *drivers)]
-    b[size : size + own, columns] = second[:, 2 * size :]
+    b[size : size + n, columns] = second[:, 2 * size :]
     for k, name in enumerate(drivers):
-        b[size + own + k, inputs.index(name)] = 1.0
-    names = (*of.coordinates, *drivers)
+        b[size + n + k, inputs.index(name)] = 1.0
+    names = (*system.coordinates, *drivers)
     states = (*names, *(f"{name}_d1" for name in names))
-    c, d, measured = _outputs(of, outputs, chosen, (a, b))
-    return StateSpace(a, b, c, d, states, tuple(inputs), measured)
+    c, d, output_names = _outputs(system, outputs, chosen, (a, b))
+    return StateSpace(a, b, c, d, states, tuple(inputs), output_names)
 
 
 def _outputs(
-    of: Linearization, selection: tuple[str, ...] | None, drivers: Sequence[int], state: tuple[np.ndarray, np.ndarray]
+    system: Linearization,
+    selection: tuple[str, ...] | None,
+    drivers: Sequence[int],
+    state: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
     """Return the matrices C and D of outputs and their rates, and the names of the rows."""
-    r, (a, b) = of._reduction, state
+    r, (a, b) = system._reduction, state
     size = len(a) // 2
     point = r.point
     if (selection is not None and not selection) or not point.model.system.outputs:
@@ -227,7 +230,7 @@ def _outputs(
         return np.zeros((0, 2 * size)), np.zeros((0, b.shape[1])), ()
     varied = point.outputs_varied(r.changes)
     components = point.components([x.shape[1] for x in varied])
-    names = _components(of.mechanism, components, selection)
+    names = _components(system.mechanism, components, selection)
     # lanes of coordinates and driver laws, of their rates, and of their second derivatives
     lanes = [[*np.arange(r.lanes(k).start, r.lanes(k).stop), *(r.lanes(k, drivers=True).start + x for x in drivers)]
              for k in range(3)]  # fmt: skip
@@ -248,11 +251,11 @@ def _components(mechanism: Mechanism, components: Any, selection: tuple[str, ...
         return list(components)
     selected = []
     for name in selection:
-        own = [c for c in components if c == name or (name in mechanism.outputs and c.startswith(f"{name}_"))]
-        if not own:
+        matches = [c for c in components if c == name or (name in mechanism.outputs and c.startswith(f"{name}_"))]
+        if not matches:
             if name in mechanism.outputs:
                 message = "follows from the whole motion, as a force or an energy does; name outputs of poses"
                 raise MechanismError(message, name=f"outputs.{name}")
             check_name("output", name, (*mechanism.outputs, *components), MechanismError, name="outputs")
-        selected += own
+        selected += matches
     return selected

@@ -43,18 +43,18 @@ def mode_motion(
     columns = reduction.basis @ shape
     columns = columns * (amplitude / np.abs(columns).max())
     phases = np.exp(2j * math.pi * np.linspace(0.0, 1.0, len(instants)))
-    moved = np.real(columns[:, None] * phases / 1j)  # begins at the equilibrium
-    model, changes, frames = point.model, point.changes(moved[None])[0], []
+    displacements = np.real(columns[:, None] * phases / 1j)  # begins at the equilibrium
+    model, changes, frames = point.model, point.changes(displacements[None])[0], []
     for k in range(len(instants)):
         coordinates = point.closed(point.displaced(changes[..., k : k + 1]))
         if coordinates is None:
             message = f"{name} cannot be shown with an amplitude of {amplitude:g}: joints stay open; choose less"
             raise SolveError(message, status=Status.NOT_ASSEMBLED)
         frames.append(coordinates)
-    whole = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[None], *frames)
-    groups = output_values(model.system.outputs, whole, model.pose_type)
+    stacked_coordinates = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[None], *frames)
+    groups = output_values(model.system.outputs, stacked_coordinates, model.pose_type)
     status = np.full(len(instants), int(Status.OK))
-    return Motion(point.mechanism, model, instants, 0, (whole, groups), status, {})
+    return Motion(point.mechanism, model, instants, 0, (stacked_coordinates, groups), status, {})
 
 
 def checked_amplitude(amplitude: object) -> float:

@@ -48,8 +48,8 @@ class Modes(Displayed):
         return len(self.eigenvalues)
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{f:.4g}" for f in self.frequencies[:6])
-        return f"<Modes {shown}{', ...' if len(self) > 6 else ''} Hz>"
+        frequencies = ", ".join(f"{f:.4g}" for f in self.frequencies[:6])
+        return f"<Modes {frequencies}{', ...' if len(self) > 6 else ''} Hz>"
 
     @property
     def angular_frequencies(self) -> Float[np.ndarray, " mode"]:
@@ -133,7 +133,7 @@ class Modes(Displayed):
     @property
     def rows(self) -> list[dict[str, Any]]:
         """One table row for each mode: kind, frequencies, and the body with the largest kinetic energy."""
-        most = [int(np.argmax(shares)) for shares in self.participation]
+        indices = [int(np.argmax(shares)) for shares in self.participation]
         values = zip(self.kinds, self.frequencies, self.damped_frequencies, self.damping_ratios, strict=True)
         return [
             {
@@ -143,8 +143,8 @@ class Modes(Displayed):
                 "damped_frequency": float(damped),
                 "damping_ratio": float(ratio),
                 "eigenvalue": complex(self.eigenvalues[k]),
-                "moves_most": self.bodies[most[k]],
-                "share": float(self.participation[k, most[k]]),
+                "moves_most": self.bodies[indices[k]],
+                "share": float(self.participation[k, indices[k]]),
             }
             for k, (kind, natural, damped, ratio) in enumerate(values)
         ]

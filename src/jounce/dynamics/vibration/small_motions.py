@@ -199,8 +199,8 @@ def _check(reduction: Reduction) -> None:
     even = np.sqrt(np.maximum(np.diag(reduction.noise(2)), 1e-300))
     values, vectors = np.linalg.eigh((mass + mass.T) / 2 / np.outer(even, even))
     if values[0] <= 1e-12 * values[-1]:
-        moving = (reduction.basis / even) @ vectors[:, 0]
-        shares = np.abs(moving).reshape(len(point.model.bodies), -1)
+        direction = (reduction.basis / even) @ vectors[:, 0]
+        shares = np.abs(direction).reshape(len(point.model.bodies), -1)
         lacking = [
             k
             for k, body in enumerate(point.mechanism.rigid_bodies.values())
@@ -209,8 +209,8 @@ def _check(reduction: Reduction) -> None:
         chosen = max(lacking or range(len(shares)), key=lambda k: shares[k].max())
         body = point.model.bodies[chosen]
         lacks = "mass" if point.mechanism.bodies[body].mass is None else "inertia"
-        moved = freely_moving(point.model, moving[None])
-        message = f"{moved} can move without moving a mass, so its acceleration is not determined; give it a mass"
+        body_names = freely_moving(point.model, direction[None])
+        message = f"{body_names} can move without moving a mass, so its acceleration is not determined; give it a mass"
         raise MechanismError(message, name=f"bodies.{body}.{lacks}")
     if names := kinked(reduction):
         message = (

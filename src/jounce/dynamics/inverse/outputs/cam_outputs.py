@@ -25,8 +25,8 @@ class _CamOutput(AbstractForceOutput):
             message = "is not a cam, and only cams have a contact force; take its reaction"
             raise MechanismError(message, name="joint", value=self.joint)
         if is_turning(element.follower) != (self.unit == "N*m"):
-            kind, word = ("turns", "contact_torque") if self.unit == "N" else ("slides", "contact")
-            raise MechanismError(f"the follower of this cam {kind}; take its {word}", name="quantity")
+            kind, quantity = ("turns", "contact_torque") if self.unit == "N" else ("slides", "contact")
+            raise MechanismError(f"the follower of this cam {kind}; take its {quantity}", name="quantity")
 
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the contact force or torque on the follower, (levels, 1, time)."""

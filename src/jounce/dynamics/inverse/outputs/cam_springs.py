@@ -83,36 +83,36 @@ def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike |
     instants = with_sides(instants, breaks) if len(instants) > 1 else instants
     output = (CamTorqueOutput if is_turning(joint.follower) else CamForceOutput)(cam)
 
-    def contact(free: float) -> np.ndarray:
-        changed: Any = {**mechanism.forces, spring: dataclasses.replace(force, **{field: free})}
+    def contact(value: float) -> np.ndarray:
+        changed: Any = {**mechanism.forces, spring: dataclasses.replace(force, **{field: value})}
         return solve(_with(mechanism, changed, output), instants, order=0).outputs["contact"][:, 0]
 
-    given = float(resolve(getattr(force, field), mechanism.parameter_values))
-    now = contact(given)
-    step = SHARE * max(abs(given), float(np.ptp(now)) / _stiffness(mechanism, force), 1e-6)
-    sense = 1.0 if np.mean(now) >= 0 else -1.0
+    given_value = float(resolve(getattr(force, field), mechanism.parameter_values))
+    forces_ = contact(given_value)
+    step = SHARE * max(abs(given_value), float(np.ptp(forces_)) / _stiffness(mechanism, force), 1e-6)
+    sense = 1.0 if np.mean(forces_) >= 0 else -1.0
 
-    def required(now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def required(forces_: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the required free length or angle at each instant, and the preload up to a constant."""
-        slope = (contact(given + step) - now) / step
+        slope = (contact(given_value + step) - forces_) / step
         if (sense * slope).max() * (sense * slope).min() <= 0:
             message = "does nothing to the contact force, or presses at some instants and pulls at others"
             raise MechanismError(message, name="spring", value=spring)
-        needed = given - now / slope
-        return needed, -needed if sense * slope[0] < 0 else needed
+        required_values = given_value - forces_ / slope
+        return required_values, -required_values if sense * slope[0] < 0 else required_values
 
-    needed, preload = required(now)
+    required_values, preload = required(forces_)
     for _ in range(ROUNDS if len(instants) > 1 else 0):
         instants = _refined_at_maxima(instants, preload)
-        now = contact(given)
-        needed, preload = required(now)
-    where = int(np.argmax(preload))
-    left = contact(float(needed[where]))
-    if abs((sense * left).min()) > EXACT * np.abs(left).max():
+        forces_ = contact(given_value)
+        required_values, preload = required(forces_)
+    peak = int(np.argmax(preload))
+    result = contact(float(required_values[peak]))
+    if abs((sense * result).min()) > EXACT * np.abs(result).max():
         raise MechanismError(
             "does not change the contact force in proportion to its free length or angle", name="spring", value=spring
         )
-    return ContactSpring(float(needed[where]), float(instants[where]), float((sense * now).min()))
+    return ContactSpring(float(required_values[peak]), float(instants[peak]), float((sense * forces_).min()))
 
 
 def _refined_at_maxima(instants: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -120,12 +120,12 @@ def _refined_at_maxima(instants: np.ndarray, values: np.ndarray) -> np.ndarray:
     edge = [-np.inf]
     before, after = np.concatenate([edge, values[:-1]]), np.concatenate([values[1:], edge])
     maxima = np.flatnonzero((values > before) & (values >= after))
-    last = len(instants) - 1
-    further = [
-        np.linspace(instants[max(k - 1, 0)], instants[min(k + 1, last)], 2 * POINTS + 1)
+    last_index = len(instants) - 1
+    refined = [
+        np.linspace(instants[max(k - 1, 0)], instants[min(k + 1, last_index)], 2 * POINTS + 1)
         for k in maxima[np.argsort(-values[maxima])][:PEAKS]
     ]
-    return np.unique(np.concatenate([instants, *further]))
+    return np.unique(np.concatenate([instants, *refined]))
 
 
 def _with(mechanism: Mechanism, forces: Any, output: Any) -> Mechanism:

@@ -46,11 +46,11 @@ class AbstractForceOutput(AbstractMotionOutput):
     def check(self, mechanism: Mechanism) -> None:
         """Raise MechanismError unless the mechanism has the named element, and masses or applied forces."""
         kinds = {"driver": ("drivers",), "joint": ("joints", "drivers", "forces"), "force": ("forces",)}[self.source]
-        known = {name: element for kind in kinds for name, element in getattr(mechanism, kind).items()}
+        elements = {name: element for kind in kinds for name, element in getattr(mechanism, kind).items()}
         name = getattr(self, self.source)
-        check_name(self.source, name, known, MechanismError, name=self.source)
+        check_name(self.source, name, elements, MechanismError, name=self.source)
         check_loads(mechanism, self.source)
-        self._check_named(known[name])
+        self._check_named(elements[name])
 
     def prepare(self, motion: Motion) -> None:
         """Compile the program of the balance of forces."""
@@ -85,8 +85,8 @@ class _DriverOutput(AbstractForceOutput):
 
     def remark(self, motion: Motion, values: np.ndarray) -> str:
         """Return the reason for NaN values, or the instants at which the force of a cam changes its sign."""
-        if why := super().remark(motion, values):
-            return why
+        if reason := super().remark(motion, values):
+            return reason
         if isinstance(getattr(motion.mechanism.drivers[self.driver], "motion", None), FollowingMotion):
             return lift_off_words(motion.time, values[:, 0])
         return signal_words(following(motion.mechanism, self.driver))
@@ -148,23 +148,23 @@ class _JointOutput(_Reaction):
         belts = [name for name, x in joints.items() if isinstance(x, Belt) and bodies & {*x.bodies}]
         forces = MotionForces.of(motion)
         loaded, pressed, pulled = ([x for x in names if forces.is_loaded(x)] for names in (gears, cams, belts))
-        remarks = ratio_words(loaded), cam_words(pressed), belt_words(pulled), flank_words(forces, bodies)
-        words = super().remark(motion, values), *remarks
-        return "; ".join(filter(None, words))
+        more_phrases = ratio_words(loaded), cam_words(pressed), belt_words(pulled), flank_words(forces, bodies)
+        phrases = super().remark(motion, values), *more_phrases
+        return "; ".join(filter(None, phrases))
 
-    def _values(self, motion: Motion, point: ArrayLike | None, part: int, size: float) -> Numbers:
+    def _values(self, motion: Motion, point: ArrayLike | None, row: int, size: float) -> Numbers:
         """Return force or moment about a point of the body, by default that of the joint, with rates."""
         mechanism, forces = motion.mechanism, MotionForces.of(motion)
         element = _exerting(mechanism, self.joint)
         body = element.bodies[min(1, len(element.bodies) - 1)] if self.body is None else self.body
         index = [GROUND, *mechanism.bodies].index
         frame = {"global": None, "body": body}.get(self.frame, self.frame)
-        about: Any = forces.point_of(self.joint, index(body)) if point is None else point
+        point_: Any = forces.point_of(self.joint, index(body)) if point is None else point
 
-        def values_of(forces: MotionForces) -> Numbers:
-            return forces.reaction(self.joint, index(body), None if frame is None else index(frame), about)[part]
+        def component_of(forces: MotionForces) -> Numbers:
+            return forces.reaction(self.joint, index(body), None if frame is None else index(frame), point_)[row]
 
-        return values_of(forces) if isinstance(element, AbstractForce) else forces.unique(values_of, size)
+        return component_of(forces) if isinstance(element, AbstractForce) else forces.unique(component_of, size)
 
 
 def _exerting(mechanism: Mechanism, name: str) -> Any:
@@ -238,8 +238,8 @@ def slack_ropes(motion: Motion) -> dict[str, str]:
         return {}
     for name in (name for name in ropes if name not in reported):
         tension = JointForceOutput(name).coefficients(motion)
-        if words := slack_words(motion.time, np.asarray(tension)[0, 0]):
-            slack[name] = f"its tension {words}"
+        if phrase := slack_words(motion.time, np.asarray(tension)[0, 0]):
+            slack[name] = f"its tension {phrase}"
     return slack
 
 
@@ -269,17 +269,17 @@ class _GroundOutput(_Reaction):
         """Raise MechanismError unless there are masses or applied forces."""
         check_loads(mechanism, self.source)
 
-    def _values(self, motion: Motion, point: ArrayLike, part: int, size: float) -> Numbers:
+    def _values(self, motion: Motion, point: ArrayLike, row: int, size: float) -> Numbers:
         """Return total force or moment about a point of the ground, with rates."""
-        mechanism, forces, about = motion.mechanism, MotionForces.of(motion), np.asarray(point)
-        between = [name for name, force in mechanism.forces.items() if not _is_load(force)]
+        mechanism, forces, center = motion.mechanism, MotionForces.of(motion), np.asarray(point)
+        internal_forces = [name for name, force in mechanism.forces.items() if not _is_load(force)]
 
-        def values_of(forces: MotionForces, names: Iterable[str]) -> Numbers:
-            start = np.zeros((forces.levels, (forces.pose_type.shifts, forces.pose_type.turns)[part], len(motion.time)))
-            return sum((forces.reaction(name, 0, None, about)[part] for name in names), start)
+        def sum_of(forces: MotionForces, names: Iterable[str]) -> Numbers:
+            start = np.zeros((forces.levels, (forces.pose_type.shifts, forces.pose_type.turns)[row], len(motion.time)))
+            return sum((forces.reaction(name, 0, None, center)[row] for name in names), start)
 
         constraints = (*mechanism.joints, *mechanism.drivers)
-        return forces.unique(lambda f: values_of(f, constraints), size) + values_of(forces, between)
+        return forces.unique(lambda f: sum_of(f, constraints), size) + sum_of(forces, internal_forces)
 
 
 class GroundForceOutput(_GroundOutput):
@@ -324,8 +324,8 @@ class _AppliedOutput(AbstractForceOutput):
 
     def _check_named(self, element):
         if element.unit != self.unit:
-            kind, other = ("force", "torque") if element.unit == "N" else ("torque", "force")
-            raise MechanismError(f"this is a {kind}, not a {other}", name="quantity")
+            kind, other_kind = ("force", "torque") if element.unit == "N" else ("torque", "force")
+            raise MechanismError(f"this is a {kind}, not a {other_kind}", name="quantity")
 
 
 class AppliedForceOutput(_AppliedOutput):

@@ -19,22 +19,22 @@ def lift_off_words(time: np.ndarray, forces: np.ndarray) -> str:
     >>> lift_off_words(np.array([0.0, 0.1, 0.2]), np.array([3.0, 1.0, -0.5]))
     'changes its sign before t = 0.2 s: a follower that is pressed against a cam lifts off there'
     """
-    known = np.isfinite(forces)
-    times, sign = time[known], np.sign(forces[known])
-    sign[np.abs(forces[known]) <= ROUNDING * np.max(np.abs(forces[known]), initial=0.0)] = 0.0
+    is_known = np.isfinite(forces)
+    times, sign = time[is_known], np.sign(forces[is_known])
+    sign[np.abs(forces[is_known]) <= ROUNDING * np.max(np.abs(forces[is_known]), initial=0.0)] = 0.0
     times, sign = times[sign != 0], sign[sign != 0]
     changes = times[1:][sign[1:] != sign[:-1]]
     if not changes.size:
         return ""
-    where = ", ".join(f"{t:.4g} s" for t in changes[:MOST_SHOWN]) + (", ..." if len(changes) > MOST_SHOWN else "")
-    return f"changes its sign before t = {where}: a follower that is pressed against a cam lifts off there"
+    instants = ", ".join(f"{t:.4g} s" for t in changes[:MOST_SHOWN]) + (", ..." if len(changes) > MOST_SHOWN else "")
+    return f"changes its sign before t = {instants}: a follower that is pressed against a cam lifts off there"
 
 
 def following(mechanism: Mechanism, leader: str) -> list[str]:
     """Return the names of drivers whose laws are functions of the coordinate of a leading driver."""
-    led = {name: getattr(driver, "motion", None) for name, driver in mechanism.drivers.items()}
-    laws = [(name, law.recipe.value[0][1]) for name, law in led.items() if isinstance(law, FollowingMotion)]
-    return [name for name, law in laws if law is led[leader] or repr(law) == repr(led[leader])]
+    all_laws = {name: getattr(driver, "motion", None) for name, driver in mechanism.drivers.items()}
+    laws = [(name, law.recipe.value[0][1]) for name, law in all_laws.items() if isinstance(law, FollowingMotion)]
+    return [name for name, law in laws if law is all_laws[leader] or repr(law) == repr(all_laws[leader])]
 
 
 def signal_words(names: Sequence[str]) -> str:
@@ -61,18 +61,18 @@ def slack_words(time: np.ndarray, tensions: np.ndarray) -> str:
     >>> slack_words(np.array([0.0, 0.1, 0.2, 0.3]), np.array([-3.0, -1.0, 0.5, -1.0]))
     'is below zero from t = 0 s to 0.1 s, at 0.3 s: the rope is slack there, and holds nothing'
     """
-    known = np.isfinite(tensions)
-    times, pushes = time[known], tensions[known] < -ROUNDING * np.max(np.abs(tensions[known]), initial=0.0)
+    is_known = np.isfinite(tensions)
+    times, pushes = time[is_known], tensions[is_known] < -ROUNDING * np.max(np.abs(tensions[is_known]), initial=0.0)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], pushes, [False]]).astype(int)))
-    parts = []
-    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
-        is_single = first == last
-        parts.append(f"at {times[first]:.4g} s" if is_single else f"from {times[first]:.4g} s to {times[last]:.4g} s")
-    if not parts:
+    phrases = []
+    for start, stop in zip(edges[::2], edges[1::2] - 1, strict=True):
+        is_single = start == stop
+        phrases.append(f"at {times[start]:.4g} s" if is_single else f"from {times[start]:.4g} s to {times[stop]:.4g} s")
+    if not phrases:
         return ""
-    parts[0] = parts[0].replace(" ", " t = ", 1)
-    more = ", ..." if len(parts) > MOST_SHOWN else ""
-    return f"is below zero {', '.join(parts[:MOST_SHOWN])}{more}: the rope is slack there, and holds nothing"
+    phrases[0] = phrases[0].replace(" ", " t = ", 1)
+    ellipsis = ", ..." if len(phrases) > MOST_SHOWN else ""
+    return f"is below zero {', '.join(phrases[:MOST_SHOWN])}{ellipsis}: the rope is slack there, and holds nothing"
 
 
 def ratio_words(names: Sequence[str]) -> str:
@@ -89,5 +89,5 @@ def cam_words(names: Sequence[str]) -> str:
 
 def belt_words(names: Sequence[str]) -> str:
     """Return a remark that reactions of bearings leave out the initial tension of belts; empty if there are none."""
-    words = "bearings show the difference of the pulls of its strands, not the tension with which it is put on"
-    return f"{', '.join(names)}: {words}" if names else ""
+    phrase = "bearings show the difference of the pulls of its strands, not the tension with which it is put on"
+    return f"{', '.join(names)}: {phrase}" if names else ""

@@ -204,10 +204,10 @@ def _with_choice_of_reactions(motion: Motion, redundant: RedundantReactions | No
     """Return the motion with another choice of redundant reactions."""
     if redundant is None or redundant == motion.mechanism.redundant_reactions:
         return motion
-    other = copy.copy(motion)
-    other.mechanism = dataclasses.replace(motion.mechanism, redundant_reactions=redundant)
-    other.derived = {}
-    return other
+    changed = copy.copy(motion)
+    changed.mechanism = dataclasses.replace(motion.mechanism, redundant_reactions=redundant)
+    changed.derived = {}
+    return changed
 
 
 def applied_force(motion: Motion, name: str) -> "xarray.DataArray":
