@@ -64,8 +64,8 @@ class FourBar:
     def turning_values(self) -> tuple[float, ...]:
         """Driver values at which the transmission angle may be extreme, modulo whole turns, rad."""
         a, b, c, d = self.crank, self.coupler, self.output, self.ground
-        right = (a * a + d * d - b * b - c * c) / (2 * a * d)  # where the angle is a right one
-        square = [math.acos(right), -math.acos(right)] if abs(right) <= 1 else []
+        cosine = (a * a + d * d - b * b - c * c) / (2 * a * d)  # where the angle is a right one
+        square = [math.acos(cosine), -math.acos(cosine)] if abs(cosine) <= 1 else []
         return tuple(self.offset + x for x in (0.0, math.pi, *square))
 
 
@@ -117,8 +117,8 @@ def extremes(linkage: Linkage, low: float, high: float) -> tuple[tuple[float, fl
 
     An infinite range stands for a whole turn.
     """
-    whole = not (math.isfinite(low) and math.isfinite(high))
-    if whole:
+    is_unlimited = not (math.isfinite(low) and math.isfinite(high))
+    if is_unlimited:
         low, high = linkage.offset - math.pi, linkage.offset + math.pi
     values = [low, high]
     for value in linkage.turning_values:
@@ -201,11 +201,11 @@ def _loop(joints: list[_Joint], crank: str) -> list[_Link] | None:
     links: list[_Link] = []
     body, joint = crank, first[0]
     while body != GROUND and len(links) < 3 and joint.guide is None:
-        following = [other for other in joints if body in other.bodies and other is not joint]
-        if len(following) != 1:
+        neighbors = [other for other in joints if body in other.bodies and other is not joint]
+        if len(neighbors) != 1:
             return None
-        links.append((body, joint, following[0]))
-        joint = following[0]
+        links.append((body, joint, neighbors[0]))
+        joint = neighbors[0]
         body = joint.bodies[1 - joint.bodies.index(body)]
     return links if body == GROUND and len(links) == 3 else None
 
@@ -220,14 +220,14 @@ def _four_bar(loop: list[_Link]) -> FourBar | None:
 
 def _slider_crank(loop: list[_Link]) -> SliderCrank | None:
     """Return a slider-crank whose guide is on the ground."""
-    (crank, first, between), (rod, _, closing), (slider, _, guide) = loop
+    (crank, first, crank_pin), (rod, _, closing), (slider, _, guide) = loop
     if guide.guide is None or guide.bodies[0] != GROUND:
         return None
     if np.max(np.abs(closing.on(slider) - guide.on(slider))) > 0:
         return None  # a hinge off the guide line: its distance depends on the orientation of the slider
-    arm, length = between.on(crank) - first.on(crank), float(np.linalg.norm(closing.on(rod) - between.on(rod)))
-    along = guide.guide / np.linalg.norm(guide.guide)
-    normal = np.array([-along[1], along[0]])
+    arm, length = crank_pin.on(crank) - first.on(crank), float(np.linalg.norm(closing.on(rod) - crank_pin.on(rod)))
+    direction = guide.guide / np.linalg.norm(guide.guide)
+    normal = np.array([-direction[1], direction[0]])
     eccentricity = float(normal @ (guide.on(GROUND) - first.on(GROUND)))
-    offset = math.atan2(along[1], along[0]) - math.atan2(arm[1], arm[0])
+    offset = math.atan2(direction[1], direction[0]) - math.atan2(arm[1], arm[0])
     return SliderCrank(float(np.linalg.norm(arm)), length, eccentricity, offset)

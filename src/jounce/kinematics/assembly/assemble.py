@@ -119,8 +119,8 @@ def find_assembly(model: Model, instant: float, tolerance: float) -> tuple[Model
     rank = initial.jacobian.rank - 1 if candidates and initial.closed else -1  # of the best so far
     for signs in candidates:
         for start in starts_with_axis_signs(model, signs, instant, tolerance):
-            drawn, _ = with_reference(dataclasses.replace(model, guess=start), start, instant, model.prescribed)
-            other, attempt = _assemble_near_guess(drawn, instant, tolerance)
+            restarted, _ = with_reference(dataclasses.replace(model, guess=start), start, instant, model.prescribed)
+            other, attempt = _assemble_near_guess(restarted, instant, tolerance)
             signs_match = attempt.closed and np.array_equal(axis_signs(model.system, attempt.coordinates), signs)
             if signs_match and attempt.jacobian.rank > rank:
                 best, rank = (dataclasses.replace(other, guess=model.guess), attempt), attempt.jacobian.rank
@@ -198,10 +198,10 @@ def _start_after_turns(
     lagging = assemble_from_guess(model, instant, tolerance, lag=lag)
     if not lagging.closed:
         return model, None
-    turned = turned_to_laws(model, lag, lagging.coordinates, Displacements(model, instant))
-    if turned is None:
+    followed = turned_to_laws(model, lag, lagging.coordinates, Displacements(model, instant))
+    if followed is None:
         return model, None
-    coordinates, history = turned
+    coordinates, history = followed
     if history is not None:
         forces, outputs = (
             with_angles(with_datums(part, coordinates), history.last_angles(part))
@@ -227,9 +227,9 @@ def check_assembled(model: Model, attempt: AssemblyAttempt, instant: float, *, f
     Missing equations are reported too, unless degrees of freedom may be left (`free`).
     """
     gaps = attempt.gaps
-    if not (known := np.isfinite(gaps)).all():
-        unknown = ", ".join(dict.fromkeys(itertools.compress(model.rows, ~known)))
-        message = f"no finite value at t = {instant:g} s: {unknown}; check motion laws and the starting guess"
+    if not (finite := np.isfinite(gaps)).all():
+        undefined = ", ".join(dict.fromkeys(itertools.compress(model.rows, ~finite)))
+        message = f"no finite value at t = {instant:g} s: {undefined}; check motion laws and the starting guess"
         raise AssemblyError(message, status=Status.INADMISSIBLE)
     if attempt.closed:
         return
@@ -270,8 +270,8 @@ def _structural_excess(model: Model, attempt: AssemblyAttempt, instant: float) -
 
     A failed assembly stops where equations are dependent at that position only, which does not count.
     """
-    anywhere = 0.1 * np.random.default_rng(1).standard_normal(model.system.shape[1])
-    jacobian = Displacements(model, instant)(attempt.coordinates, anywhere).jacobian
+    displacement = 0.1 * np.random.default_rng(1).standard_normal(model.system.shape[1])
+    jacobian = Displacements(model, instant)(attempt.coordinates, displacement).jacobian
     return len(model.rows) - jacobian.scaled(jacobian.row_scale).rank if jacobian.finite().all() else 0
 
 
@@ -356,16 +356,16 @@ def check_mobility(model: Model, redundant: Redundancy, *, free: bool = False) -
 
 def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:
     """Return the names of the bodies that move along directions of the coordinates, (directions, columns), in words."""
-    chosen = moving_bodies(model, directions)
-    shown = ", ".join(chosen[:6])
-    return shown + (f" and {len(chosen) - 6} more" if len(chosen) > 6 else "")
+    names = moving_bodies(model, directions)
+    phrase = ", ".join(names[:6])
+    return phrase + (f" and {len(names) - 6} more" if len(names) > 6 else "")
 
 
 def moving_bodies(model: Model, directions: Float[np.ndarray, "direction column"]) -> list[str]:
     """Return the bodies that move along directions of the coordinates, the fastest first."""
     sizes = np.linalg.norm(directions.reshape(len(directions), len(model.bodies), -1), axis=(0, 2))
-    own = [k for k, name in enumerate(model.bodies) if not name.endswith(ENDING)]  # carriages move with the bodies
-    weights, names = sizes[own], [model.bodies[k] for k in own]
+    indices = [k for k, name in enumerate(model.bodies) if not name.endswith(ENDING)]  # carriages move with the bodies
+    weights, names = sizes[indices], [model.bodies[k] for k in indices]
     order = np.argsort(-weights, kind="stable")
     return [names[k] for k in order if weights[k] > 0.05 * weights[order[0]]]
 

@@ -53,8 +53,8 @@ class SameDirection(Module):
         else:
             sides = perpendiculars(jnp.asarray(self.vector_i))
         direction = body_j.direction(self.vector_j)
-        along = body_i.direction(self.vector_i).dot(direction) + 1.0
-        return rows(*(body_i.direction(side).dot(direction) / along for side in sides))
+        denominator = body_i.direction(self.vector_i).dot(direction) + 1.0
+        return rows(*(body_i.direction(side).dot(direction) / denominator for side in sides))
 
 
 def axis_signs(system: System, coordinates: Coordinates) -> AxisSigns:
@@ -77,8 +77,8 @@ def drawn_axis_signs(model: Model) -> AxisSigns:
 
 def pair_names(model: Model) -> list[str]:
     """Return the name of the joint of each pair of directions."""
-    named = named_groups(model)
-    names = [members for group, members in named for _ in facts_of(type(group.element)).held_parallel]
+    groups = named_groups(model)
+    names = [members for group, members in groups for _ in facts_of(type(group.element)).held_parallel]
     return list(itertools.chain(*names))
 
 
@@ -91,15 +91,15 @@ def axis_signs_to_try(model: Model, attempt: AssemblyAttempt) -> list[AxisSigns]
     signs = signs_of(model, attempt) if attempt.closed else None
     if signs is not None and signs.all():
         return []
-    drawn = _cosines(model.system, model.guess)
-    meant = drawn > DRAWN_OPPOSITE
+    cosines = _cosines(model.system, model.guess)
+    drawn_signs = cosines > DRAWN_OPPOSITE
     if signs is not None:
-        as_meant = np.array_equal(signs, meant)
+        as_drawn = np.array_equal(signs, drawn_signs)
     else:  # where a law has no finite value, no other start helps
-        as_meant = bool(np.all(np.abs(drawn) > DRAWN_NEARLY)) or not np.isfinite(attempt.gaps).all()
-    if as_meant:
+        as_drawn = bool(np.all(np.abs(cosines) > DRAWN_NEARLY)) or not np.isfinite(attempt.gaps).all()
+    if as_drawn:
         return []
-    return [meant] if meant.all() else [meant, np.ones_like(meant)]
+    return [drawn_signs] if drawn_signs.all() else [drawn_signs, np.ones_like(drawn_signs)]
 
 
 def starts_with_axis_signs(model: Model, signs: AxisSigns, instant: float, tolerance: float) -> Iterator[Coordinates]:
@@ -108,10 +108,10 @@ def starts_with_axis_signs(model: Model, signs: AxisSigns, instant: float, toler
     Drivers hold in the first half of them. In each half, one start has the attitudes aligned beforehand, since distant
     bodies otherwise pull parts around.
     """
-    turned = assemble_from_guess(_directed(model, signs, only_directions=True), instant, tolerance)
+    aligned = assemble_from_guess(_directed(model, signs, only_directions=True), instant, tolerance)
     for driven in (True, False):
         directed = _directed(model, signs, driven=driven)
-        for start in (model.guess, turned.coordinates)[: 1 + turned.closed]:
+        for start in (model.guess, aligned.coordinates)[: 1 + aligned.closed]:
             attempt = assemble_from_guess(directed, instant, tolerance, start)
             if attempt.closed:
                 yield attempt.coordinates
@@ -132,31 +132,31 @@ def _directed(model: Model, signs: AxisSigns, *, only_directions: bool = False, 
         Whether to keep the drivers.
     """
     groups = [] if only_directions else [group for group in model.system.groups if driven or not group.is_driver]
-    leads, first = list(range(model.system.body_count + 1)), 0
+    parents, first = list(range(model.system.body_count + 1)), 0
     for group, names in _pairs(model.system):
-        chosen = np.arange(group.instances)
-        factors = np.where(signs[first + chosen], 1.0, -1.0)
+        members = np.arange(group.instances)
+        factors = np.where(signs[first + members], 1.0, -1.0)
         first += group.instances
         if only_directions:
-            chosen = np.array([k for k in chosen if _joins(leads, group.bodies[0][k], group.bodies[1][k])], int)
-        if len(chosen):
-            vector_i, vector_j = (_unit(group, name)[:, chosen, None] for name in names)
-            slots = tuple(tuple(slot[k] for k in chosen) for slot in group.bodies[:2])
-            groups.append(Group(SameDirection(vector_i, vector_j * factors[chosen, None]), slots))
+            members = np.array([k for k in members if _joins(parents, group.bodies[0][k], group.bodies[1][k])], int)
+        if len(members):
+            vector_i, vector_j = (_unit(group, name)[:, members, None] for name in names)
+            slots = tuple(tuple(slot[k] for k in members) for slot in group.bodies[:2])
+            groups.append(Group(SameDirection(vector_i, vector_j * factors[members, None]), slots))
     unnamed = tuple(("",) * group.instances for group in groups)
     parts = ((tuple(groups), unnamed), ((), ()), ((), ()))
     return model_of(model.bodies, parts, model.guess, model.length, None)
 
 
-def _joins(leads: list[int], body: int, other: int) -> bool:
-    """Join the sets of two bodies (union-find by `leads`), and return whether they were separate."""
+def _joins(parents: list[int], body: int, other: int) -> bool:
+    """Join the sets of two bodies (union-find by `parents`), and return whether they were separate."""
     ends = []
     for start in (body, other):
         end = start
-        while leads[end] != end:
-            leads[end] = end = leads[leads[end]]
+        while parents[end] != end:
+            parents[end] = end = parents[parents[end]]
         ends.append(end)
-    leads[ends[0]] = ends[1]
+    parents[ends[0]] = ends[1]
     return ends[0] != ends[1]
 
 
@@ -194,17 +194,17 @@ def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
     position = np.asarray(coordinates["position"])
     for group, members in named_groups(model):
         rolling = group.element
-        if not (along := facts_of(type(rolling)).rolls_along):
+        if not (fields := facts_of(type(rolling)).rolls_along):
             continue
         slots = [np.array(slot) for slot in group.bodies]
         line, center = (
             position[:, slot, 0] + in_global_axes(np.asarray(point)[..., 0], coordinates, slot)
             for point, slot in zip((rolling.point_i, rolling.point_j), slots, strict=True)
         )
-        side = in_global_axes(_right_of(*(_unit(group, name) for name in along)), coordinates, slots[0])
+        side = in_global_axes(_right_of(*(_unit(group, name) for name in fields)), coordinates, slots[0])
         radius = np.asarray(rolling.radius)[..., 0]
-        off = np.abs(np.sum(side * (center - line), axis=0) + radius)
-        names += [name for name, x in zip(members, off <= MIRRORED * radius, strict=False) if x]
+        deviation = np.abs(np.sum(side * (center - line), axis=0) + radius)
+        names += [name for name, x in zip(members, deviation <= MIRRORED * radius, strict=False) if x]
     return names
 
 

@@ -94,10 +94,10 @@ class ReducedConstraints:
             Coefficients of the scaled coordinates.
         """
         bases, lanes = (self.free, self.dependent, self.inverse, self.held.astype(float)), np.moveaxis(series, 0, -1)
-        given, kind = (self.model.system, self.coordinates, bases), self.model.pose_type
-        parts = in_chunks(lambda k: _along(*given, lanes[..., k], pose_type=kind), len(series), (LANES,), threads=1)
-        equations, sizes, moved = (np.moveaxis(x, -1, 0) for x in parts)
-        return equations, sizes, moved
+        arguments, kind = (self.model.system, self.coordinates, bases), self.model.pose_type
+        parts = in_chunks(lambda k: _along(*arguments, lanes[..., k], pose_type=kind), len(series), (LANES,), threads=1)
+        equations, sizes, displacements = (np.moveaxis(x, -1, 0) for x in parts)
+        return equations, sizes, displacements
 
     def gap(self, series: Float[np.ndarray, "lane order k"], order: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the coefficients of g up to an order, (lanes, order * s), and the bound below which each is zero."""
@@ -125,18 +125,18 @@ def _along(
 ) -> tuple[Any, Any, Any]:
     free, dependent, inverse, held = bases
     order, lanes = len(series), series.shape[-1]
-    wide = {name: jnp.broadcast_to(x, (*x.shape[:-1], lanes)) for name, x in coordinates.items()}
-    pose: Any = pose_at(wide, pose_type)
+    start = {name: jnp.broadcast_to(x, (*x.shape[:-1], lanes)) for name, x in coordinates.items()}
+    pose: Any = pose_at(start, pose_type)
     time = Jet.variable(jnp.zeros((1, lanes)), order)
-    equations, sizes, moved = [], [], []
+    equations, sizes, displacements = [], [], []
     for k in range(1, order + 1):
-        rest = system.residual(pose.extended(None, None), time.truncate(k)).dense().coefficients[k]
-        column = _product(free, series[k - 1]) - _product(inverse, rest)
+        remainder = system.residual(pose.extended(None, None), time.truncate(k)).dense().coefficients[k]
+        column = _product(free, series[k - 1]) - _product(inverse, remainder)
         pose = pose.extended(*system.coordinates(column, pose.shifts))
-        equations.append(_product(dependent.T, rest))
-        sizes.append(jnp.max(jnp.abs(rest) * held[:, None], axis=0))
-        moved.append(column)
-    return jnp.stack(equations), jnp.stack(sizes), jnp.stack(moved)
+        equations.append(_product(dependent.T, remainder))
+        sizes.append(jnp.max(jnp.abs(remainder) * held[:, None], axis=0))
+        displacements.append(column)
+    return jnp.stack(equations), jnp.stack(sizes), jnp.stack(displacements)
 
 
 def _product(matrix: Float[Numbers, "row column"], columns: Float[Numbers, "column lane"]) -> Any:

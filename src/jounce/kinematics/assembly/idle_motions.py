@@ -63,8 +63,8 @@ def idle_motions(model: Model, redundant: Redundancy, coordinates: Coordinates, 
 def _moved_together(parts: Float[np.ndarray, "direction body coordinate"]) -> list[list[int]]:
     """Return clusters of bodies that null-space directions move together."""
     projector = np.einsum("dbc,def->bcef", parts, parts)
-    joined = np.sqrt((projector**2).sum(axis=(1, 3))) > RELATED
-    return [cluster for cluster in clusters(joined) if joined[cluster[0], cluster[0]]]
+    related = np.sqrt((projector**2).sum(axis=(1, 3))) > RELATED
+    return [cluster for cluster in clusters(related) if related[cluster[0], cluster[0]]]
 
 
 def _spin(
@@ -85,14 +85,14 @@ def _spin(
     """
     velocity = mode * np.asarray(model.system.column_scale)
     positions, attitudes = (np.asarray(coordinates[name])[:, [k + 1 for k in members], 0] for name in _POSE)
-    turning = turned(attitudes, velocity[:, 3:].T)
-    at_origin = velocity[:, :3].T - np.cross(turning.T, positions.T).T  # velocity of the point at the global origin
-    size = np.linalg.norm(turning[:, 0])
+    omega = turned(attitudes, velocity[:, 3:].T)
+    at_origin = velocity[:, :3].T - np.cross(omega.T, positions.T).T  # velocity of the point at the global origin
+    size = np.linalg.norm(omega[:, 0])
     scale = RELATED * np.array([size, size * model.length])
-    alike = [np.abs(part - part[:, :1]).max(initial=0.0) for part in (turning, at_origin)]
-    if size < RELATED or (np.array(alike) > scale).any():
+    spreads = [np.abs(part - part[:, :1]).max(initial=0.0) for part in (omega, at_origin)]
+    if size < RELATED or (np.array(spreads) > scale).any():
         return None
-    axis = turning[:, 0] / size
+    axis = omega[:, 0] / size
     if abs(axis @ at_origin[:, 0]) > scale[1]:  # a screw motion, with translation along the axis
         return None
     return axis, np.cross(axis, at_origin[:, 0]) / size
@@ -101,13 +101,13 @@ def _spin(
 def _is_finite(members: list[int], spin: tuple[Any, Any], coordinates: Coordinates, displace: Displace) -> bool:
     """Return whether all constraints hold after large turns of bodies about a line, the other bodies at rest."""
     axis, point = spin
-    bodies, still = [k + 1 for k in members], np.zeros(6 * (np.shape(coordinates["position"])[1] - 1))
+    bodies, no_increment = [k + 1 for k in members], np.zeros(6 * (np.shape(coordinates["position"])[1] - 1))
     for angle in TURNS:
         turn = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])[:, None]
         position, attitude = (np.array(coordinates[name]) for name in _POSE)
         position[:, bodies, 0] = point[:, None] + turned(turn, position[:, bodies, 0] - point[:, None])
         attitude[:, bodies, 0] = quaternion_product(turn, attitude[:, bodies, 0])
-        residual = displace({**coordinates, "position": position, "quaternion": attitude}, still).residual
+        residual = displace({**coordinates, "position": position, "quaternion": attitude}, no_increment).residual
         if not np.abs(residual).max(initial=0.0) < HELD:
             return False
     return True

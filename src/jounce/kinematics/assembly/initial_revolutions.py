@@ -78,18 +78,18 @@ def driver_lag(model: Model, laws: Sequence[np.ndarray], residual: Float[np.ndar
     if len(rows) != sum(group.instances for group in groups) or not np.isfinite(residual).all():
         return None
     size = np.zeros(len(model.rows))
-    turning, periodic = np.zeros(len(size), bool), np.zeros(len(size), bool)
+    is_angle, periodic = np.zeros(len(size), bool), np.zeros(len(size), bool)
     angles = iter(laws)
     first = 0
     for group in groups:
         driver_rows = rows[first : first + group.instances]
         first += group.instances
         size[driver_rows] = -residual[driver_rows]
-        turning[driver_rows] = dimension_of_field(group.element, "motion") == "angle"
+        is_angle[driver_rows] = dimension_of_field(group.element, "motion") == "angle"
         if measures_angle(group):
-            turning[driver_rows] = periodic[driver_rows] = True
+            is_angle[driver_rows] = periodic[driver_rows] = True
             size[driver_rows] = (next(angles) - np.asarray(group.element.datum.angle))[:, 0]
-    return DriverLag(size, turning, periodic)
+    return DriverLag(size, is_angle, periodic)
 
 
 def turned_to_laws(
@@ -117,18 +117,18 @@ def turned_to_laws(
     turns, skipped = lag.angle / WHOLE_TURN, 0
     if turns > MOST_TURNS:
         skipped = int(turns) - MOST_TURNS + 1
-    left = np.arange(0, turns * STEPS_A_TURN)[::-1] / (STEPS_A_TURN * turns)
+    fractions = np.arange(0, turns * STEPS_A_TURN)[::-1] / (STEPS_A_TURN * turns)
     states, last = [start], None
     increment = np.zeros(model.system.shape[1])
-    for count, part in enumerate(left):
-        if skipped and count == len(left) - skipped * STEPS_A_TURN:
+    for count, fraction in enumerate(fractions):
+        if skipped and count == len(fractions) - skipped * STEPS_A_TURN:
             last = _repeated(states, skipped)
             if last is not None:
                 break
             if turns > MOST_FOLLOWED:
                 return None
             skipped = 0  # drivers at different rates: no turn repeats the last one
-        corrected = _corrected(states[-1], increment, lambda r, p=part: lag.open(r, p), displace)
+        corrected = _corrected(states[-1], increment, lambda r, p=fraction: lag.open(r, p), displace)
         if corrected is None:
             return None
         coordinates, increment = corrected
@@ -147,14 +147,14 @@ def _corrected(
     displace: Displace,
 ) -> tuple[Coordinates, Float[np.ndarray, " column"]] | None:
     """Return the coordinates after a Newton-Raphson corrected step, and the step; None if it does not converge."""
-    whole, trial = increment, displace(coordinates, increment)
+    total, trial = increment, displace(coordinates, increment)
     for _ in range(CORRECTIONS):
         step = trial.jacobian.step(opened(trial.residual))
         if step is None or (size := np.max(np.abs(step), initial=0.0)) > 0.5:
             return None
-        whole, trial = whole + step, displace(trial.coordinates, step)
+        total, trial = total + step, displace(trial.coordinates, step)
         if size < 1e-9:
-            return trial.coordinates, whole
+            return trial.coordinates, total
     return None
 
 
@@ -195,19 +195,19 @@ def nearest_turns(
     missing_turns = ((np.asarray(guess["angle"]) - coordinates["angle"]) / WHOLE_TURN)[1:, 0]
     if not np.round(missing_turns).any():
         return coordinates
-    still = residual_at(coordinates["angle"])
+    residual = residual_at(coordinates["angle"])
 
     def shifted(turns: np.ndarray) -> np.ndarray:
         return coordinates["angle"] + WHOLE_TURN * np.concatenate([[0.0], turns])[:, None]
 
     bodies = np.arange(len(missing_turns))
-    changes = np.stack([residual_at(shifted((bodies == k) * 1.0)) - still for k in bodies])
-    counted = np.abs(changes) > 1e-6
+    changes = np.stack([residual_at(shifted((bodies == k) * 1.0)) - residual for k in bodies])
+    counts_turns = np.abs(changes) > 1e-6
     turns = np.round(missing_turns)
-    for members in clusters(counted @ counted.T):  # bodies that share a row that counts turns
-        if counted[members].any():
+    for members in clusters(counts_turns @ counts_turns.T):  # bodies that share a row that counts turns
+        if counts_turns[members].any():
             turns[members] = _coupled_turns(changes[members], missing_turns[members])
-    if not turns.any() or np.max(np.abs(residual_at(shifted(turns)) - still)) > 1e-6:
+    if not turns.any() or np.max(np.abs(residual_at(shifted(turns)) - residual)) > 1e-6:
         return coordinates
     return {**coordinates, "angle": shifted(turns)}
 
@@ -218,14 +218,14 @@ def _coupled_turns(
     """Return the whole turns nearest to `missing_turns` that change no row; `changes` are by one turn of each."""
     if np.max(np.abs(np.round(missing_turns) @ changes)) < 1e-6:
         return np.round(missing_turns)
-    left, sizes, _ = np.linalg.svd(changes)
+    vectors, sizes, _ = np.linalg.svd(changes)
     rank = int(np.sum(sizes > 1e-9 * sizes[0]))
     if len(missing_turns) - rank != 1:
         return np.zeros(len(missing_turns))
-    direction = left[:, -1]
+    direction = vectors[:, -1]
     direction = direction / np.min(np.abs(direction[np.abs(direction) > 1e-9]))
     for count in range(SMALLEST_PERIOD, LARGEST_PERIOD + 1):
-        whole = np.round(count * direction)
-        if np.max(np.abs(whole - count * direction)) < 1e-7 * count:
-            return np.round(missing_turns @ whole / (whole @ whole)) * whole
+        turns = np.round(count * direction)
+        if np.max(np.abs(turns - count * direction)) < 1e-7 * count:
+            return np.round(missing_turns @ turns / (turns @ turns)) * turns
     return np.zeros(len(missing_turns))

@@ -24,7 +24,7 @@ def joints_of(model: Model) -> dict[str, list[str]]:
     return joints
 
 
-def missing_joint_words(model: Model, moving: Sequence[str], left: int) -> str:
+def missing_joint_words(model: Model, moving: Sequence[str], freedom: int) -> str:
     """Return a hint at a missing joint for bodies with degrees of freedom left, or an empty string.
 
     Parameters
@@ -33,19 +33,19 @@ def missing_joint_words(model: Model, moving: Sequence[str], left: int) -> str:
         The assembled model.
     moving : sequence of str
         Names of the bodies that can move.
-    left : int
+    freedom : int
         Number of degrees of freedom left.
     """
     joints = joints_of(model)
     loose = [body for body in moving if len(joints[body]) <= 1]
-    if not loose or (len(loose) == 1 and left == 1 and joints[loose[0]]):
+    if not loose or (len(loose) == 1 and freedom == 1 and joints[loose[0]]):
         return ""  # a crank that lacks a driver, not a joint
     supports = [f"by {joints[body][0]} alone" if joints[body] else "by no joint" for body in loose]
     first, *others = zip(loose, supports, strict=True)
     phrases = [f"{first[0]} is held {first[1]}", *map(" ".join, others[: MOST_NAMED - 1])]
-    words = f"{', '.join(phrases)}{', ...' if len(supports) > MOST_NAMED else ''}"
+    phrase = f"{', '.join(phrases)}{', ...' if len(supports) > MOST_NAMED else ''}"
     if len(loose) != 2:
-        return f"{words}: is a joint missing?"
+        return f"{phrase}: is a joint missing?"
     components = model.pose_type.shifts
-    kind = "a revolute joint" if left in (OF_A_HINGE[components], OF_A_HINGE[components] + 1) else "a joint"
-    return f"{words}: is {kind} missing between them, bodies: [{loose[0]}, {loose[1]}]?"
+    kind = "a revolute joint" if freedom in (OF_A_HINGE[components], OF_A_HINGE[components] + 1) else "a joint"
+    return f"{phrase}: is {kind} missing between them, bodies: [{loose[0]}, {loose[1]}]?"

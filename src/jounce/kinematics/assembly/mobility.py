@@ -54,10 +54,10 @@ class Branch:
     cusp: bool = False
 
     def __str__(self) -> str:
-        turning = {name: _turn(vectors[0]) for name, vectors in self.tangents.items()}
-        most = max(turning.values(), key=abs, default=0.0)
-        if self.freedom == 1 and most:
-            phrases = [f"{name} {turn / most + 0.0:.3g}" for name, turn in turning.items()]
+        rates = {name: _turn(vectors[0]) for name, vectors in self.tangents.items()}
+        largest = max(rates.values(), key=abs, default=0.0)
+        if self.freedom == 1 and largest:
+            phrases = [f"{name} {turn / largest + 0.0:.3g}" for name, turn in rates.items()]
             return ", ".join(phrases[:6]) + (", ..." if len(phrases) > 6 else "")
         moving = [name for name, vectors in self.tangents.items() if np.abs(vectors).max(initial=0.0) > 1e-9]
         return f"{_freedom(self.freedom)} of {', '.join(moving[:6])}{', ...' if len(moving) > 6 else ''}"
@@ -117,14 +117,14 @@ class Mobility:
             return f"change point with {len(self.branches)} branches to order {self.order}, tangents: {tangents}"
         if not self.branches:
             return f"singular position with {self.instantaneous} {noun}: {ADVICE}"
-        where = "at a cusp, where the motion comes to rest and turns back" if self.kind == "cusp" else "singular here"
-        return f"{finite}, {where}: of {self.instantaneous} {noun} the others are blocked at order {self.blocked}"
+        place = "at a cusp, where the motion comes to rest and turns back" if self.kind == "cusp" else "singular here"
+        return f"{finite}, {place}: of {self.instantaneous} {noun} the others are blocked at order {self.blocked}"
 
 
 def independent(coordinates: int, equations: int) -> Mobility:
     """Return the mobility of a mechanism whose equations are independent at a position."""
-    left = coordinates - equations
-    return Mobility(coordinates, equations, left, left, None, "regular" if left else "rigid")
+    freedom = coordinates - equations
+    return Mobility(coordinates, equations, freedom, freedom, None, "regular" if freedom else "rigid")
 
 
 @concrete
@@ -208,44 +208,46 @@ def _released(mechanism: Mechanism, time: float) -> tuple[Model, AssemblyAttempt
 def _analyzed(constraints: ReducedConstraints, displace: Displace) -> Mobility:
     """Return the mobility at a position where equations are dependent."""
     columns, rows = constraints.inverse.shape
-    left, order = constraints.free.shape[1], constraints.order
-    if not left:
+    freedom, order = constraints.free.shape[1], constraints.order
+    if not freedom:
         return Mobility(columns, rows, 0, 0, None, "rigid")
     if _all_go_on(constraints):
-        whole = Branch(left, _by_body(constraints, constraints.free.T))
-        return Mobility(columns, rows, left, left, order, "regular", None, (whole,))
+        single = Branch(freedom, _by_body(constraints, constraints.free.T))
+        return Mobility(columns, rows, freedom, freedom, order, "regular", None, (single,))
     local_curves = curves(constraints)
-    going = [curve for curve in local_curves if curve.order == order]
-    branches = _branches(constraints, going, displace)
+    full_curves = [curve for curve in local_curves if curve.order == order]
+    branches = _branches(constraints, full_curves, displace)
     blocked = max((curve.order + 1 for curve in local_curves if curve.order < order), default=2)
     finite = max((branch.freedom for branch in branches), default=0)
     if not branches:
         moves = _moves_by_trial(constraints, displace)
         kind: Kind = "singular" if moves else "shaky"
-        return Mobility(columns, rows, left, int(moves), order, kind, blocked)
+        return Mobility(columns, rows, freedom, int(moves), order, kind, blocked)
     only, *others = branches
-    kind = "change point" if others else "cusp" if only.cusp else "regular" if only.freedom == left else "singular"
-    return Mobility(columns, rows, left, finite, order, kind, blocked, branches)
+    kind = "change point" if others else "cusp" if only.cusp else "regular" if only.freedom == freedom else "singular"
+    return Mobility(columns, rows, freedom, finite, order, kind, blocked, branches)
 
 
 def _all_go_on(constraints: ReducedConstraints) -> bool:
     """Return whether all velocities can be continued, judged by a random sample."""
     count = constraints.free.shape[1]
-    some = np.random.default_rng(2).standard_normal((RANDOM_CURVES, count))
+    velocities = np.random.default_rng(2).standard_normal((RANDOM_CURVES, count))
     series = np.zeros((RANDOM_CURVES, constraints.order, count))
-    series[:, 0] = some / np.linalg.norm(some, axis=1, keepdims=True)
+    series[:, 0] = velocities / np.linalg.norm(velocities, axis=1, keepdims=True)
     gap, allowed = constraints.gap(series, constraints.order)
     return bool((np.abs(gap) <= allowed).all())
 
 
-def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], displace: Displace) -> tuple[Branch, ...]:
+def _branches(
+    constraints: ReducedConstraints, full_curves: Sequence[LocalCurve], displace: Displace
+) -> tuple[Branch, ...]:
     """Return the branches to which curves belong: curves with the same tangent space a little farther on are one."""
     members: list[tuple[np.ndarray, list[LocalCurve]]] = []
-    for curve in going:
+    for curve in full_curves:
         coefficients = constraints.along(curve.series[None])[2][0]
         step = NEARBY ** (1.0 / curve.multiplicity)
-        everything = np.ones(len(constraints.dependent), bool)
-        nearby = closed_nearby(constraints.coordinates, constraints.placed(coefficients, step), everything, displace)
+        all_rows = np.ones(len(constraints.dependent), bool)
+        nearby = closed_nearby(constraints.coordinates, constraints.placed(coefficients, step), all_rows, displace)
         velocity = constraints.free @ curve.tangent
         space = velocity[None] if nearby is None else nearby.free_directions
         for basis, branch_curves in members:
@@ -265,13 +267,13 @@ def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], disp
 
 def _moves_by_trial(constraints: ReducedConstraints, displace: Displace) -> bool:
     """Return whether bodies displaced along a free velocity can be assembled near the displaced position."""
-    everything = np.ones(len(constraints.dependent), bool)
+    all_rows = np.ones(len(constraints.dependent), bool)
     random = np.random.default_rng(3).standard_normal((2 * RANDOM_CURVES, constraints.free.shape[1]))
     directions = np.concatenate([np.eye(random.shape[1]), -np.eye(random.shape[1]), random])
     for direction in directions:
-        sway = constraints.free @ direction
-        sway *= FARTHER / np.abs(sway).max()
-        if closed_nearby(constraints.coordinates, sway, everything, displace) is not None:
+        shift = constraints.free @ direction
+        shift *= FARTHER / np.abs(shift).max()
+        if closed_nearby(constraints.coordinates, shift, all_rows, displace) is not None:
             return True
     return False
 

@@ -153,9 +153,9 @@ def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, disp
         return []
     random, jacobians = np.random.default_rng(1), []  # any directions will do, as long as they are reproducible
     for _ in range(POSITIONS):
-        sway = random.normal(size=len(directions)) @ directions
+        shift = random.normal(size=len(directions)) @ directions
         for size in SWAYS:
-            nearby = closed_nearby(coordinates, size * sway / np.abs(sway).max(), joints, displace)
+            nearby = closed_nearby(coordinates, size * shift / np.abs(shift).max(), joints, displace)
             if nearby is not None:
                 jacobians.append(nearby)
                 break
@@ -169,18 +169,18 @@ def _along_curves(
     if not joints.any() or jacobian.is_large:
         return []
     constraints = ReducedConstraints.at(model, coordinates, jacobian.dense(), CURVE_ORDER, joints)
-    going = [curve for curve in curves(constraints) if curve.order == CURVE_ORDER]
+    full_curves = [curve for curve in curves(constraints) if curve.order == CURVE_ORDER]
     jacobians = []
-    for curve in going:
+    for curve in full_curves:
         coefficients = constraints.along(curve.series[None])[2][0]
-        sway = constraints.placed(coefficients, SWAYS[-1] ** (1.0 / curve.multiplicity))
-        nearby = closed_nearby(coordinates, sway, joints, displace)
+        shift = constraints.placed(coefficients, SWAYS[-1] ** (1.0 / curve.multiplicity))
+        nearby = closed_nearby(coordinates, shift, joints, displace)
         jacobians += [] if nearby is None else [nearby]
     return jacobians
 
 
 def closed_nearby(
-    coordinates: Coordinates, sway: Float[np.ndarray, " column"], joints: Bool[np.ndarray, " row"], displace: Displace
+    coordinates: Coordinates, shift: Float[np.ndarray, " column"], joints: Bool[np.ndarray, " row"], displace: Displace
 ) -> HostJacobian | None:
     """Return the Jacobian at a position near a displaced one that fulfills the joints; None if it falls back.
 
@@ -188,14 +188,14 @@ def closed_nearby(
     ----------
     coordinates : dict of str to array
         Coordinates of all bodies.
-    sway : array of shape (columns,)
+    shift : array of shape (columns,)
         Displacement, rad and sizes of the mechanism.
     joints : array of bool, shape (rows,)
         Rows that must hold.
     displace : callable
         As in `redundancy`.
     """
-    displaced, total = displace(coordinates, sway), sway
+    displaced, total = displace(coordinates, shift), shift
     for _ in range(MOST_STEPS):
         correction = displaced.jacobian.take(joints).step(displaced.residual[joints])
         if correction is None or np.abs(correction).max(initial=0.0) > 1.0:
@@ -203,9 +203,9 @@ def closed_nearby(
         displaced, total = displace(displaced.coordinates, correction), total + correction
         if np.abs(correction).max(initial=0.0) < 1e-12:
             break
-    displacement = np.abs(total).max(initial=0.0)
+    distance = np.abs(total).max(initial=0.0)
     open_ = np.abs(displaced.residual[joints]).max(initial=0.0)
-    return displaced.jacobian if open_ <= CLOSED and displacement > 0.1 * np.abs(sway).max() else None
+    return displaced.jacobian if open_ <= CLOSED and distance > 0.1 * np.abs(shift).max() else None
 
 
 def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row combination"]) -> tuple[Repetition, ...]:
@@ -223,16 +223,16 @@ def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row comb
     repeated = []
     while combinations.shape[1]:
         ranks = {name: _rank(part) for name, part in parts.items()}
-        most = max(ranks.values())
+        rank = max(ranks.values())
         # among joints that repeat equally many, the last one; a driver comes after all joints
-        name = [name for name in names if ranks[name] == most][-1]
-        _, _, turned = np.linalg.svd(parts[name])
-        own, rest = turned[:most].T, turned[most:].T
-        others = [other for other in names if other != name and np.linalg.norm(parts[other] @ own) > OPEN]
-        kind, _, plain = name.partition(".")
-        repeated.append(Repetition(KINDS.get(kind, kind), plain, most, tuple(x.partition(".")[2] for x in others)))
-        combinations = combinations @ rest
-        parts = {name: part @ rest for name, part in parts.items()}
+        name = [name for name in names if ranks[name] == rank][-1]
+        _, _, basis = np.linalg.svd(parts[name])
+        used, unused = basis[:rank].T, basis[rank:].T
+        others = [other for other in names if other != name and np.linalg.norm(parts[other] @ used) > OPEN]
+        kind, _, short_name = name.partition(".")
+        repeated.append(Repetition(KINDS.get(kind, kind), short_name, rank, tuple(x.partition(".")[2] for x in others)))
+        combinations = combinations @ unused
+        parts = {name: part @ unused for name, part in parts.items()}
     return tuple(repeated)
 
 

@@ -60,7 +60,7 @@ def curves(constraints: ReducedConstraints) -> list[LocalCurve]:
     for tangent in tangents:
         smooth = _continued(constraints, tangent, 1)
         if smooth.order < constraints.order:
-            branches += [smooth] if (turning := _cusp(constraints, tangent)) is None else [turning]
+            branches += [smooth] if (cusp := _cusp(constraints, tangent)) is None else [cusp]
         else:
             branches.append(smooth)
     return branches
@@ -103,15 +103,15 @@ def _distinct(tangents: Sequence[Float[np.ndarray, " k"]]) -> list[Float[np.ndar
     """Return tangents along different lines; if too many, those farthest from each other."""
     if not len(tangents):
         return []
-    whole = np.asarray(tangents)
-    chosen = [int(np.argmax(np.abs(whole).max(axis=1)))]
+    candidates = np.asarray(tangents)
+    chosen = [int(np.argmax(np.abs(candidates).max(axis=1)))]
     while len(chosen) < MOST_CURVES:
-        along = np.abs(whole @ whole[chosen].T).max(axis=1)
-        farthest = int(np.argmin(along))
-        if np.arccos(min(along[farthest], 1.0)) < SAME:
+        cosines = np.abs(candidates @ candidates[chosen].T).max(axis=1)
+        farthest = int(np.argmin(cosines))
+        if np.arccos(min(cosines[farthest], 1.0)) < SAME:
             break
         chosen.append(farthest)
-    return [whole[k] for k in chosen]
+    return [candidates[k] for k in chosen]
 
 
 def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"], multiplicity: int) -> LocalCurve:
@@ -136,15 +136,15 @@ def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]
 
 def _fulfilling(constraints: ReducedConstraints, series: Series, multiplicity: int, order: int) -> Series | None:
     """Return a nearby series that fulfills the equations to an order, by Gauss-Newton steps, or None."""
-    known = slice(multiplicity - 1, order - multiplicity)  # the coefficients on which the equations depend
-    shape = series[known].shape
+    used = slice(multiplicity - 1, order - multiplicity)  # the coefficients on which the equations depend
+    shape = series[used].shape
 
     def with_values(values: np.ndarray) -> np.ndarray:
-        whole = np.repeat(series[None], len(values), axis=0)
-        whole[:, known] = values.reshape(-1, *shape)
-        return whole
+        full_series = np.repeat(series[None], len(values), axis=0)
+        full_series[:, used] = values.reshape(-1, *shape)
+        return full_series
 
-    values, damping = series[known].ravel(), 0.0
+    values, damping = series[used].ravel(), 0.0
     gap, allowed = constraints.gap(with_values(values[None]), order)
     for _ in range(STEPS):
         if (np.abs(gap[0]) <= allowed[0]).all():
@@ -156,15 +156,15 @@ def _fulfilling(constraints: ReducedConstraints, series: Series, multiplicity: i
         slope = ((ahead - behind) / (2 * DIFFERENCE)).T * weights[:, None]
         # the tangent keeps length one, later coefficients stay perpendicular to it
         first, later = values[: shape[1]], values.reshape(shape)[1:]
-        fixed = np.zeros((shape[0], values.size))
-        fixed[0, : shape[1]] = first
+        tangent_rows = np.zeros((shape[0], values.size))
+        tangent_rows[0, : shape[1]] = first
         for k, row in enumerate(later, 1):
-            fixed[k, k * shape[1] : (k + 1) * shape[1]], fixed[k, : shape[1]] = first, row
-        across = np.concatenate([[0.5 * (first @ first - 1.0)], later @ first])
-        heavy = np.max(np.abs(slope), initial=1.0)
-        whole = np.concatenate([slope, heavy * fixed])
-        right = np.concatenate([gap[0] * weights, heavy * across])
-        step = -np.linalg.lstsq(whole, right, rcond=1e-9)[0]
+            tangent_rows[k, k * shape[1] : (k + 1) * shape[1]], tangent_rows[k, : shape[1]] = first, row
+        tangent_gaps = np.concatenate([[0.5 * (first @ first - 1.0)], later @ first])
+        weight = np.max(np.abs(slope), initial=1.0)
+        matrix = np.concatenate([slope, weight * tangent_rows])
+        rhs = np.concatenate([gap[0] * weights, weight * tangent_gaps])
+        step = -np.linalg.lstsq(matrix, rhs, rcond=1e-9)[0]
         step *= min(1.0, 1.0 / max(np.abs(step).max(initial=0.0), 1e-300))
         trials = values + np.array([1.0, 0.5, 0.25, 0.1])[:, None] * step
         gaps, limits = constraints.gap(with_values(trials), order)

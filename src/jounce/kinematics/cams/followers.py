@@ -30,8 +30,8 @@ class AbstractFollower(abc.ABC):
         check_choice("shape", self.shape, SHAPES, MechanismError)
         for field in dataclasses.fields(self):  # type: ignore[arg-type] - every follower is a dataclass
             if field.name != "shape":
-                needed = field.name == "center_distance" or (field.name == "arm" and not self.is_flat)
-                check = positive if needed else finite
+                is_positive = field.name == "center_distance" or (field.name == "arm" and not self.is_flat)
+                check = positive if is_positive else finite
                 object.__setattr__(self, field.name, check(field.name, getattr(self, field.name)))
         if self.shape == "roller":
             positive("radius", self.radius)
@@ -110,13 +110,14 @@ class TranslatingFollower(AbstractFollower):
         """Return the height on the base circle."""
         if self.is_flat:
             return base_radius
-        reach = base_radius + self.radius
-        if abs(self.offset) >= reach:
+        prime_radius = base_radius + self.radius
+        if abs(self.offset) >= prime_radius:
             message = (
-                f"is not less than the radius of the prime circle, {reach:g} m, so that the follower misses the cam"
+                f"is not less than the radius of the prime circle, {prime_radius:g} m, so that the follower misses "
+                "the cam"
             )
             raise MechanismError(message, name="offset", value=self.offset)
-        return float(np.sqrt(reach**2 - self.offset**2))
+        return float(np.sqrt(prime_radius**2 - self.offset**2))
 
     def center(self, coordinate: Jet) -> Jet:
         """Return the center of the roller, or the edge."""
@@ -196,10 +197,10 @@ class OscillatingFollower(AbstractFollower):
                 )
                 raise MechanismError(message, name="center_distance", value=c)
             return float(np.arcsin(sine))
-        reach = base_radius + self.radius
-        cosine = (c**2 + self.arm**2 - reach**2) / (2 * c * self.arm)
+        prime_radius = base_radius + self.radius
+        cosine = (c**2 + self.arm**2 - prime_radius**2) / (2 * c * self.arm)
         if not -1 < cosine < 1:
-            low, high = abs(c - reach), c + reach
+            low, high = abs(c - prime_radius), c + prime_radius
             message = f"must be from {low:g} m to {high:g} m for the follower to reach the base circle"
             raise MechanismError(message, name="arm", value=self.arm)
         return float(np.arccos(cosine))
@@ -224,16 +225,16 @@ class OscillatingFollower(AbstractFollower):
     def touching(self, points: Plane) -> Float[np.ndarray, " points"]:
         """Return the angle of the arm, or of the face, at which it comes down on points."""
         x, y = self.center_distance - points[0], points[1]
-        distance, above = np.hypot(x, y), np.arctan2(y, x)
+        distance, direction = np.hypot(x, y), np.arctan2(y, x)
         with np.errstate(invalid="ignore", divide="ignore"):
             if self.is_flat:
                 sine = self.face_offset / distance
-                coordinate = above + np.arcsin(sine)
+                coordinate = direction + np.arcsin(sine)
                 return np.where(np.abs(sine) <= 1, coordinate, -np.inf)
             cosine = (self.arm**2 + distance**2 - self.radius**2) / (2 * self.arm * distance)
             if not self.radius:
-                return np.where(np.abs(distance - self.arm) <= 1e-9 * self.arm, above, -np.inf)
-            return np.where(np.abs(cosine) <= 1, above + np.arccos(np.clip(cosine, -1, 1)), -np.inf)
+                return np.where(np.abs(distance - self.arm) <= 1e-9 * self.arm, direction, -np.inf)
+            return np.where(np.abs(cosine) <= 1, direction + np.arccos(np.clip(cosine, -1, 1)), -np.inf)
 
 
 Follower = TranslatingFollower | OscillatingFollower

@@ -84,8 +84,8 @@ class PlateCam(Displayed):
     @property
     def shown_units(self) -> ShownUnits:
         """The units for display and files."""
-        known = {str(name): x.attrs["units"] for name, x in self.dataset.variables.items()}
-        return ShownUnits(self.units, known)
+        variable_units = {str(name): x.attrs["units"] for name, x in self.dataset.variables.items()}
+        return ShownUnits(self.units, variable_units)
 
     def at(self, angle: ArrayLike) -> Geometry:
         """Return the cam at any cam angles, rad, exact to rounding."""
@@ -139,9 +139,9 @@ class PlateCam(Displayed):
     @cached_property
     def undercuts(self) -> tuple[Undercut, ...]:
         """The parts of the law that the cam cannot give, with cam angles and lost lift."""
-        lost = self.table.lift - self.followed_lift
+        lost_lift = self.table.lift - self.followed_lift
         size = 1.0 if self.follower.turning else self.base_radius
-        return tuple(runs(self.angle, lost, lost > NOTICED * size))
+        return tuple(runs(self.angle, lost_lift, lost_lift > NOTICED * size))
 
     @cached_property
     def followed_lift(self) -> Numbers1:
@@ -189,8 +189,8 @@ class PlateCam(Displayed):
         step = WHOLE_TURN / max(len(self.angle) - 1, 1)
         best = float(self.angle[int(np.nanargmax(size(value(self.table))))])
         for _ in range(ROUNDS):
-            near = best + step * np.linspace(-1, 1, POINTS)
-            best = float(near[int(np.nanargmax(size(value(self.at(near)))))])
+            angles = best + step * np.linspace(-1, 1, POINTS)
+            best = float(angles[int(np.nanargmax(size(value(self.at(angles)))))])
             step *= 2 / (POINTS - 1)
         return Extreme(float(value(self.at(best))[0]), float(best % WHOLE_TURN))
 
@@ -280,9 +280,9 @@ def _check(cam: PlateCam) -> None:
         raise TrajectoryError(message, name="law", value=float(lift[-1]))
     coordinate = start + lift
     low, high = (0.0, np.pi / 2 if follower.is_flat else np.pi) if follower.turning else (0.0, np.inf)
-    bad = ~((coordinate > low) & (coordinate < high))
-    if bad.any():
-        where = int(np.argmax(bad))
+    outside = ~((coordinate > low) & (coordinate < high))
+    if outside.any():
+        where = int(np.argmax(outside))
         message = f"takes the follower through the axis of the cam, or out of reach, at {cam.angle[where]:.6g} rad"
         raise MechanismError(message, name="law", value=float(lift[where]))
 
@@ -293,23 +293,23 @@ def _geometry(cam: PlateCam, angles: Numbers1) -> Geometry:
     theta = Jet.variable(angles, ORDER)
     lift = cam.law(theta)
     coordinate = lift + follower.start(cam.base_radius)
-    back = theta * -sense  # in the frame of the cam, the follower rotates the other way
+    frame_angle = theta * -sense  # in the frame of the cam, the follower rotates the other way
     if follower.is_flat:
         direction, distance = follower.face(coordinate)
-        normal = unit(direction + back)
-        turning = (direction + back).differentiate()
-        pitch = profile = normal * distance + perpendicular(normal) * (distance.differentiate() / turning)
+        normal = unit(direction + frame_angle)
+        direction_rate = (direction + frame_angle).differentiate()
+        pitch = profile = normal * distance + perpendicular(normal) * (distance.differentiate() / direction_rate)
         tangent = perpendicular(normal) * -sense
     else:
-        pitch = rotated(follower.center(coordinate), back)
+        pitch = rotated(follower.center(coordinate), frame_angle)
         tangent = pitch.differentiate()
         tangent = tangent / sqrt(_dot(tangent, tangent))
         normal = perpendicular(tangent) * sense  # away from the cam
         profile = pitch - normal * follower.radius
     forward, around = (_dot(tangent, curve.differentiate()) for curve in (profile, pitch))
     turned = _dot(tangent, normal.differentiate())
-    center = rotated(pitch, -back)
-    travel = rotated(follower.travel(coordinate, center), back)
+    center = rotated(pitch, -frame_angle)
+    travel = rotated(follower.travel(coordinate, center), frame_angle)
     pressure = atan2((travel[0] * normal[1] - travel[1] * normal[0]) * sense, _dot(travel, normal))
     contact = follower.along_face(coordinate, center) if follower.is_flat else lift * 0.0
     jets = (lift, pitch, profile, pressure, forward, around, turned, contact)

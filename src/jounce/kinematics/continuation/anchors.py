@@ -104,8 +104,8 @@ def multiplicity_ahead(anchors: Sequence[Anchor]) -> float:
     if len(anchors) < 2 or not anchors[-2].det_rate < 0:
         return np.nan
     before, last = anchors[-2:]
-    lost = before.reach - last.reach
-    return (last.instant - before.instant) / lost if lost > 0 else np.inf
+    decrease = before.reach - last.reach
+    return (last.instant - before.instant) / decrease if decrease > 0 else np.inf
 
 
 def hidden_zero(anchors: Sequence[Anchor]) -> ChangePoint | None:

@@ -65,10 +65,10 @@ def bridged(
     """
     width = half_width(point, solver.order)
     first, last = path.anchors[0].instant, path.anchors[-1].instant
-    near = [a for a in path.anchors if a.instant < point.instant]
-    far = [a for a in path.anchors if a.instant > point.instant]
+    near_side = [a for a in path.anchors if a.instant < point.instant]
+    far_side = [a for a in path.anchors if a.instant > point.instant]
     ends = []
-    for anchors, end in ((near, max(point.instant - width, first)), (far, min(point.instant + width, last))):
+    for anchors, end in ((near_side, max(point.instant - width, first)), (far_side, min(point.instant + width, last))):
         if abs(end - point.instant) < spoiled_width(point, solver.order):
             return None
         local = follow(solver, [a for a in anchors if a.instant <= end][-1], end, last - first)
@@ -84,12 +84,12 @@ def _interpolated(before: Anchor, after: Anchor, instants: Float[np.ndarray, " t
     from scipy.interpolate import BPoly  # imported late, as importing SciPy takes half a second
 
     duration = after.instant - before.instant
-    share = (instants - before.instant) / duration
+    fraction = (instants - before.instant) / duration
 
     def between(left: np.ndarray, right: np.ndarray) -> np.ndarray:
         scale = np.array([math.factorial(k) * duration**k for k in range(len(left))])
         curve = BPoly.from_derivatives([0.0, 1.0], [x.reshape(len(x), -1) * scale[:, None] for x in (left, right)])
-        values = np.stack([curve(share, nu=k).T / scale[k] for k in range(len(left))])
+        values = np.stack([curve(fraction, nu=k).T / scale[k] for k in range(len(left))])
         return values.reshape(*left.shape[:-1], len(instants))
 
     return jax.tree.map(between, before.state[:2], after.state[:2])

@@ -93,7 +93,7 @@ def take_steps(
     limits: StepLimits,
     settings: Settings,
     search: Bool[Numbers, ""],
-    most: Int[Numbers, ""],
+    batch_limit: Int[Numbers, ""],
     *,
     pose_type: type[Pose],
     order: int,
@@ -112,7 +112,7 @@ def take_steps(
         Next grid instants, s, infinite beyond the last; at least one batch more than can be solved.
     limits, settings, search
         See `StepLimits` and `advance`.
-    most : int
+    batch_limit : int
         Largest number of batches to solve.
     pose_type, order
         PlanarPose or SpatialPose; derivatives requested.
@@ -143,7 +143,7 @@ def take_steps(
         return _batch(system, settings, run.source, run.step, run.instant, search, pose_type=pose_type, order=order)
 
     def going(state: TakenSteps) -> Any:
-        return (state.run.control.ending == int(StopReason.UNFINISHED)) & (state.count < most)
+        return (state.run.control.ending == int(StopReason.UNFINISHED)) & (state.count < batch_limit)
 
     def go_on(state: TakenSteps) -> TakenSteps:
         arrival = _typed(solved(state.run), blank)
@@ -156,9 +156,9 @@ def take_steps(
         records = Records(anchors, points, instants)  # later batches overwrite lanes that belong to no step
         return TakenSteps(_typed(run, state.run), records, arrival, state.count + 1, state.steps + jnp.sum(taken))
 
-    def put(whole: Any, part: Any, index: Any) -> Any:
+    def put(arrays: Any, values: Any, index: Any) -> Any:
         update = jax.lax.dynamic_update_slice_in_dim
-        return jax.tree.map(lambda xs, x: update(xs, x, index, -1), whole, _typed(part, whole))
+        return jax.tree.map(lambda xs, x: update(xs, x, index, -1), arrays, _typed(values, arrays))
 
     def room(like: Any, length: int) -> Any:
         return jax.tree.map(lambda x: jnp.zeros((*x.shape[:-1], length), x.dtype), like)
@@ -207,12 +207,12 @@ def _after_batch(
     control, status, lanes = run.control, arrival.status[0], len(run.instant) - 1
     target = control.target
     arrived = ExpansionPoint(target, arrival.safe_step[0], arrival.radius[0], arrival.det_rate[0])
-    good = is_accepted(control, status, arrived)
-    within = good & (_next_up(run, grid) <= target)
+    accepted = is_accepted(control, status, arrived)
+    within = accepted & (_next_up(run, grid) <= target)
     run = run._replace(next_up=run.next_up + jnp.sum(within))
-    behind = jnp.sum(_next_up(run, grid) <= target)  # a few are solved from the next anchor, which is near
-    taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else repeat the step for the others
+    count = jnp.sum(_next_up(run, grid) <= target)  # a few are solved from the next anchor, which is near
+    taken = accepted & (count <= jnp.where(target < limits.stop, lanes // 2, 0))  # else repeat the step for the others
     source = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), arrival_source, run.source)
-    again = jax.tree.map(lambda x: jnp.where(good & ~taken, x, jnp.nan), arrived)
-    control = next_control(control, status, arrived, limits, good, taken)
-    return _with_step(run._replace(source=source, arrived=again), control, grid), arrived, taken
+    repeated = jax.tree.map(lambda x: jnp.where(accepted & ~taken, x, jnp.nan), arrived)
+    control = next_control(control, status, arrived, limits, accepted, taken)
+    return _with_step(run._replace(source=source, arrived=repeated), control, grid), arrived, taken

@@ -97,8 +97,8 @@ def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, 
     """
     for k in range(1, time.order + 1):
         trial = pose.extended(None, None)
-        right = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
-        pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
+        rhs = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
+        pose = pose.extended(*system.coordinates(factor.solve(rhs), pose.shifts))
         pose = jax.lax.optimization_barrier(pose)  # otherwise XLA recomputes it wherever it is used
     return pose
 
@@ -131,7 +131,7 @@ def safe_step_and_radius(system: System, coordinates: dict[str, Jet], predictor:
     """
     terms = _terms(system, coordinates, predictor)
     steps = [jnp.power(jnp.maximum(term, 1e-300), -1.0 / k) for k, term in enumerate(terms, 1)]
-    safe_step, radius = (SAFE_FRACTION * jnp.min(jnp.stack(some), axis=0) for some in (steps, steps[:3]))
+    safe_step, radius = (SAFE_FRACTION * jnp.min(jnp.stack(subset), axis=0) for subset in (steps, steps[:3]))
     return safe_step, radius / SAFE_FRACTION
 
 
@@ -154,11 +154,11 @@ def _finite_results(
     """Return whether the pose and each output are finite up to the requested order."""
 
     def finite(jet: Numbers, axes: tuple[int, ...]) -> Any:
-        above = (np.arange(len(jet)) > finite_order).reshape(-1, *[1] * (jet.ndim - 1))
-        return jnp.all(jnp.isfinite(jet) | above, axis=axes)
+        unused = (np.arange(len(jet)) > finite_order).reshape(-1, *[1] * (jet.ndim - 1))
+        return jnp.all(jnp.isfinite(jet) | unused, axis=axes)
 
-    posed = [finite(jnp.max(part, axis=-2), tuple(range(part.ndim - 2))) for part in coordinates]
-    return jnp.concatenate([jnp.all(jnp.stack(posed), axis=0, keepdims=True), *(finite(x, (0, 1)) for x in outputs)])
+    checks = [finite(jnp.max(part, axis=-2), tuple(range(part.ndim - 2))) for part in coordinates]
+    return jnp.concatenate([jnp.all(jnp.stack(checks), axis=0, keepdims=True), *(finite(x, (0, 1)) for x in outputs)])
 
 
 def _signs(system: System, factor: Factor, before: Callable[[], tuple[Pose, Jet]], sign: Lanes) -> Lanes:
@@ -182,12 +182,12 @@ def _gaps(
     if system.rank is None:
         return np.zeros((2, 0, *terms[0].shape))
     rate = jnp.max(jnp.stack([jnp.power(term, 1.0 / k) for k, term in enumerate(terms, 1)]), axis=0)
-    first, *others = system.residual(pose, time).dense().coefficients
+    values, *derivatives = system.residual(pose, time).dense().coefficients
     allowed = GAP_TOLERANCES * tolerance
-    over, part = [jnp.abs(first) / jnp.maximum(allowed, LARGEST_GAP)], jnp.maximum(allowed, LARGEST_CONTRADICTION)
-    for k, level in enumerate(others, 1):
-        over.append(jnp.abs(level) / jnp.maximum(part * rate**k, 1e-300)[None])
-    return jnp.stack([jnp.abs(first), jnp.max(jnp.nan_to_num(jnp.stack(over)), axis=0)])
+    ratios, bound = [jnp.abs(values) / jnp.maximum(allowed, LARGEST_GAP)], jnp.maximum(allowed, LARGEST_CONTRADICTION)
+    for k, level in enumerate(derivatives, 1):
+        ratios.append(jnp.abs(level) / jnp.maximum(bound * rate**k, 1e-300)[None])
+    return jnp.stack([jnp.abs(values), jnp.max(jnp.nan_to_num(jnp.stack(ratios)), axis=0)])
 
 
 def _status(
@@ -210,8 +210,8 @@ def _status(
         (~admissible, Status.INADMISSIBLE),
     )
     status = np.full(correction.shape, int(Status.OK))
-    for happened, outcome in outcomes:
-        status = jnp.where(happened, int(outcome), status)
+    for condition, outcome in outcomes:
+        status = jnp.where(condition, int(outcome), status)
     return status
 
 
@@ -278,34 +278,34 @@ def solved_batch(
     """Return the result of `advance` without the searched values, the factored Jacobian, and the pose."""
     (jets, angles, sign), (tolerance, refine, finite_order) = source, settings
     # infinite derivatives of a law, such as the third one of t**2.5 at t = 0, are useless for predictions
-    moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in jets.items()}
-    predicted = pose_type.predicted_from(moving, step)
+    finite_jets = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in jets.items()}
+    predicted = pose_type.predicted_from(finite_jets, step)
     time = Jet.variable(instant[None], order)
     pose, factor, correction = newton_raphson(system, predicted, time.truncate(0), tolerance, refine)
     pose = differentiated(system, pose, factor, time)
 
     outputs = _outputs(system, pose, angles, step)
-    reached = pose.coordinates()
-    coordinates: dict[str, Numbers] = {name: stacked(jet) for name, jet in reached.items()}
+    solved_jets = pose.coordinates()
+    coordinates: dict[str, Numbers] = {name: stacked(jet) for name, jet in solved_jets.items()}
     departures = _departures(system, pose, predicted)
     departure = jnp.max(departures, axis=0)
-    travel = travel_of(_terms(system, moving, pose_type.predictor), step)
+    travel = travel_of(_terms(system, finite_jets, pose_type.predictor), step)
     signs = _signs(
-        system, factor, lambda: (pose_type.predicted_from(moving, 0.0 * step), Jet([(instant - step)[None]])), sign
+        system, factor, lambda: (pose_type.predicted_from(finite_jets, 0.0 * step), Jet([(instant - step)[None]])), sign
     )
     predictable = near_prediction(departure, travel) & laws_predictable(system, instant, step, order)
     predictable &= correction.contracts() & ((sign == 0) | (signs == sign))
     admissible, pivot_ratio = system.admissible(time), factor.pivot_ratio()
     finite = _finite_results([coordinates[name] for name in pose_type.predictor], outputs, finite_order)
     admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
-    terms = _terms(system, reached, pose_type.predictor)
+    terms = _terms(system, solved_jets, pose_type.predictor)
     gaps = _gaps(system, pose, time, terms, tolerance)
     consistent = jnp.all(gaps[1] <= 1.0, axis=0)
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, consistent, tolerance)
     body, deviation = jnp.argmax(departures, axis=0), departure / jnp.maximum(travel, 1e-300)
-    nothing = jnp.zeros_like(step)  # placeholder of the searched values
+    zeros = jnp.zeros_like(step)  # placeholder of the searched values
     arrival = StepResult(
-        coordinates, outputs, status, body, nothing, nothing, deviation, signs, nothing, pivot_ratio, admissible,
+        coordinates, outputs, status, body, zeros, zeros, deviation, signs, zeros, pivot_ratio, admissible,
         finite, gaps,
     )  # fmt: skip
     return arrival, factor, pose

@@ -85,33 +85,33 @@ def newton_raphson(
     def iterate(state: _Iteration) -> _Iteration:
         pose, before, correction, rate, distance, count = state
         residual = system.residual(pose, time).coefficients[0]
-        on, slow = going(state), ~(rate <= SLOWEST)
-        anew = (count == 0) | (count > 1) & jnp.any(on & slow)  # the second correction measures the contraction
+        active, slow = going(state), ~(rate <= SLOWEST)
+        refactor = (count == 0) | (count > 1) & jnp.any(active & slow)  # the second correction measures the contraction
         small = (count == 1) & jnp.all(correction.last <= NEARLY_ROUNDING)  # the Jacobian here serves as the final one
-        moved = anew | small | ~jnp.any(on)
+        renewed = refactor | small | ~jnp.any(active)
         if system.fronts is None:
-            factor = jax.lax.cond(moved, lambda: refactored(system, pose, time, before, anew), lambda: before)
+            factor = jax.lax.cond(renewed, lambda: refactored(system, pose, time, before, refactor), lambda: before)
         else:  # results of a branch are copied, and copying so many fronts takes longer than factoring them
-            moved = anew = np.ones((), bool)
-            factor = refactored(system, pose, time, before, anew)
+            renewed = refactor = np.ones((), bool)
+            factor = refactored(system, pose, time, before, refactor)
         step = factor.solve(-residual, refined=False)
-        size = again = sized(pose, step)
+        size = second_size = sized(pose, step)
         if system.fronts is not None:  # the second correction with the first Jacobian, for `contracts`
             second = partial(sized, pose)
-            again = jax.lax.cond(count == 1, lambda: second(before.solve(-residual, refined=False)), lambda: size)
-        made = refine | ~(size <= tolerance)
-        pose = pose.displaced(*system.coordinates(jnp.where(made, step, 0.0), pose.shifts))
+            second_size = jax.lax.cond(count == 1, lambda: second(before.solve(-residual, refined=False)), lambda: size)
+        applied = refine | ~(size <= tolerance)
+        pose = pose.displaced(*system.coordinates(jnp.where(applied, step, 0.0), pose.shifts))
         compared = (count == 1) & (refine | ~(correction.last <= tolerance))  # otherwise the pose has not changed
         first = jnp.where(count == 0, size, correction.first)
-        simplified = jnp.where(compared, again, correction.simplified)
-        rate = jnp.where(anew, size, size / jnp.maximum(correction.last, 1e-300))
-        counts = made & (on | ~moved)  # corrections of converged lanes are rounding, which may exceed `ROUNDING`
-        distance = jnp.where(moved, 0.0, distance) + jnp.where(counts, size, 0.0)
+        simplified = jnp.where(compared, second_size, correction.simplified)
+        rate = jnp.where(refactor, size, size / jnp.maximum(correction.last, 1e-300))
+        counts = applied & (active | ~renewed)  # those of converged lanes are rounding, which may exceed `ROUNDING`
+        distance = jnp.where(renewed, 0.0, distance) + jnp.where(counts, size, 0.0)
         return _Iteration(pose, factor, Correction(size, first, simplified), rate, distance, count + 1)
 
     lanes = time.coefficients[0].shape[-1]
-    unknown, nothing = np.full(lanes, np.inf), np.zeros(lanes)
-    correction = Correction(unknown, unknown, nothing)
-    start = _Iteration(pose, blank_factor(system, lanes), correction, nothing, nothing, np.zeros((), int))
+    unknown, zeros = np.full(lanes, np.inf), np.zeros(lanes)
+    correction = Correction(unknown, unknown, zeros)
+    start = _Iteration(pose, blank_factor(system, lanes), correction, zeros, zeros, np.zeros((), int))
     end = jax.lax.while_loop(unfinished, iterate, start)
     return end.pose, end.factor, end.correction

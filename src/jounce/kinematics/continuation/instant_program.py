@@ -27,17 +27,17 @@ def round_width(system: System) -> int:
     if not on_processor():
         return GPU_WIDTH
     entries = math.prod(system.shape if system.fronts is None else system.fronts.shape)
-    least, most = WIDTHS
-    return max(least, min(most, 2 ** int(math.log2(max(1, CACHED_ENTRIES // max(1, entries))))))
+    narrowest, widest = WIDTHS
+    return max(narrowest, min(widest, 2 ** int(math.log2(max(1, CACHED_ENTRIES // max(1, entries))))))
 
 
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
     """Solve many instants as `advance_instant` does one; instants of one motion are not searched."""
-    (system, settings), (source, step, instant, own, search) = shared, instants
-    given = of_design(system, own), settings, source, step, instant
-    if own is None:
-        return solved_batch(*given, pose_type=pose_type, order=order)[0]
-    return advance(*given, jnp.any(search), pose_type=pose_type, order=order, searched=step.shape[-1])
+    (system, settings), (source, step, instant, design, search) = shared, instants
+    arguments = of_design(system, design), settings, source, step, instant
+    if design is None:
+        return solved_batch(*arguments, pose_type=pose_type, order=order)[0]
+    return advance(*arguments, jnp.any(search), pose_type=pose_type, order=order, searched=step.shape[-1])
 
 
 @mapped(by_xla=_of_many)
@@ -54,18 +54,22 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
     pose_type, order
         As in `advance`.
     """
-    (system, settings), (source, step, instant, own, search) = shared, instants
-    reflected = with_fields(of_design(system, own), reflected=True)
-    how: Any = {"pose_type": pose_type, "order": order, "with_det_rate": own is not None or finds_det_rate(system)}
-    return advance(reflected, settings, source, step, instant, search[0], **how)
+    (system, settings), (source, step, instant, design, search) = shared, instants
+    reflected = with_fields(of_design(system, design), reflected=True)
+    options: Any = {
+        "pose_type": pose_type,
+        "order": order,
+        "with_det_rate": design is not None or finds_det_rate(system),
+    }
+    return advance(reflected, settings, source, step, instant, search[0], **options)
 
 
-def of_design(values: Values, own: Mapping[int, Any] | None) -> Values:
-    """Return a system with leaves replaced by the `own` values of a design, or of several, by leaf index."""
-    if not own:
+def of_design(values: Values, design: Mapping[int, Any] | None) -> Values:
+    """Return a system with leaves replaced by the `design` values of a design, or of several, by leaf index."""
+    if not design:
         return values
     leaves, structure = jax.tree.flatten(values)
-    return jax.tree.unflatten(structure, [own.get(k, leaf) for k, leaf in enumerate(leaves)])
+    return jax.tree.unflatten(structure, [design.get(k, leaf) for k, leaf in enumerate(leaves)])
 
 
 def finds_det_rate(system: System) -> bool:

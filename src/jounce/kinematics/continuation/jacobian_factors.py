@@ -30,17 +30,17 @@ def factored(system: System, pose: Pose, time: Jet) -> Factor:
     return ReflectedFactor.of(matrix, system.elimination_order) if system.reflected else DenseFactor.of(matrix)
 
 
-def refactored(system: System, pose: Pose, time: Jet, old: Factor, anew: Bool[Numbers, ""]) -> Factor:
+def refactored(system: System, pose: Pose, time: Jet, old: Factor, forced: Bool[Numbers, ""]) -> Factor:
     """Return the factored Jacobian at a pose of order zero, given factors at a pose nearby.
 
-    Unless `anew` is set, the given factors are kept with the new matrices, if refinement makes their solutions exact to
+    Unless `forced`, the given factors are kept with the new matrices, if refinement makes their solutions exact to
     rounding.
     """
     if not isinstance(old, DenseFactor | ReflectedFactor):
         return factored(system, pose, time)
     reused = old.refining(system.jacobian(pose, time))
     stale = jnp.any(~(reused.defect() <= STALE))
-    return jax.lax.cond(anew | stale, reused.renewed, lambda: reused)
+    return jax.lax.cond(forced | stale, reused.renewed, lambda: reused)
 
 
 def blank_factor(system: System, lanes: int) -> Factor:

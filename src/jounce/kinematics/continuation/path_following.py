@@ -65,23 +65,23 @@ class FollowedPath:
     hidden: ChangePoint | None = None  # multiple zero of the determinant at which the path ends
     backends: set[str] = dataclasses.field(default_factory=set)
 
-    def add(self, done: TakenSteps, first: int) -> None:
+    def add(self, result: TakenSteps, first: int) -> None:
         """Add the anchors of a run, and the grid instants that it solved, starting with index `first`."""
-        (anchors, points, grid), steps, count = done.records, int(done.steps), int(done.run.next_up)
+        (anchors, points, grid), steps, count = result.records, int(result.steps), int(result.run.next_up)
         self.backends.add(backend_of(anchors.status))
         leaves, structure = jax.tree.flatten(anchors[:3])
         states = [np.array(np.asarray(x)[..., :steps]) for x in leaves]  # copies, which do not keep the records alive
-        values, passed = [np.asarray(x)[:steps].tolist() for x in (*points, anchors.status)], Status.OK
+        values, passed_status = [np.asarray(x)[:steps].tolist() for x in (*points, anchors.status)], Status.OK
         for lane, (instant, safe_step, radius, det_rate, status) in enumerate(zip(*values, strict=True)):
-            outcome = passed if status == OK else Status(status)
+            outcome = passed_status if status == OK else Status(status)
             self.anchors.append(Anchor(instant, states, lane, structure, safe_step, radius, det_rate, outcome))
         if not count:
             return
         parts, lanes = [np.asarray(x)[..., :count] for x in jax.tree.leaves(grid[:3])], slice(first, first + count)
         self.solved_leaves = self.solved_leaves or [np.empty((*x.shape[:-1], len(self.is_solved))) for x in parts]
         self.is_solved[lanes] = np.asarray(grid.status)[:count] == OK
-        for whole, part in zip(self.solved_leaves, parts, strict=True):
-            whole[..., lanes] = part
+        for array, part in zip(self.solved_leaves, parts, strict=True):
+            array[..., lanes] = part
 
     def anchors_around(self, first: float, last: float) -> list[Anchor]:
         """Return the anchors between two instants, with the one before and the one after, where they exist."""
@@ -100,9 +100,9 @@ class FollowedPath:
             point = hidden_zero(self.anchors[k - 2 : k + 1])
             if point is not None:
                 del self.anchors[k + 1 :]
-                self.hidden, beyond = point, float(np.nextafter(self.anchors[k].instant, np.inf))
-                self.is_solved[grid >= beyond] = False
-                self.ended(Status.SINGULAR, beyond, ", ".join(drivers))
+                self.hidden, end = point, float(np.nextafter(self.anchors[k].instant, np.inf))
+                self.is_solved[grid >= end] = False
+                self.ended(Status.SINGULAR, end, ", ".join(drivers))
                 return True
         return False
 
@@ -120,10 +120,10 @@ class FollowedPath:
         Rounding spoils the data of anchors next to it, so an anchor farther off is used.
         """
         end, passed = self.anchors[-1].instant, self.change_points[-1].instant if self.change_points else -np.inf
-        since = itertools.takewhile(lambda anchor: anchor.instant > passed, reversed(self.anchors))
-        ahead = [x for x in since if x.det_rate < 0 and _is_just_beyond(x, end)]
-        largest = max((x.radius for x in ahead), default=0.0)
-        return [ChangePoint(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
+        later = itertools.takewhile(lambda anchor: anchor.instant > passed, reversed(self.anchors))
+        approaching = [x for x in later if x.det_rate < 0 and _is_just_beyond(x, end)]
+        largest = max((x.radius for x in approaching), default=0.0)
+        return [ChangePoint(x.instant + x.reach, x.radius) for x in approaching if x.radius >= 0.5 * largest][:1]
 
 
 def history_of(anchors: Sequence[Anchor]) -> AttitudeHistory | None:
@@ -132,9 +132,9 @@ def history_of(anchors: Sequence[Anchor]) -> AttitudeHistory | None:
         return None
     times = np.array([anchor.instant for anchor in anchors])
     series = np.concatenate([anchor.state[0]["quaternion"] for anchor in anchors], axis=-1)
-    between = partial(attitudes_between, times, np.where(np.isfinite(series), series, 0.0))
+    interpolated = partial(attitudes_between, times, np.where(np.isfinite(series), series, 0.0))
     instants = within_steps(times, SAMPLES_A_STEP)
-    return AttitudeHistory(between(instants), instants, between=between)
+    return AttitudeHistory(interpolated(instants), instants, between=interpolated)
 
 
 def _is_just_behind(point: "Anchor | ExpansionPoint") -> Any:
@@ -152,13 +152,13 @@ def _is_just_beyond(point: "Anchor | ExpansionPoint", end: float) -> Any:
     return _is_just_ahead(point) & ((end - point.instant) * -point.det_rate < 1 + LEAST_PASSAGE)
 
 
-def is_next_to_singular(point: ExpansionPoint, begins: Bool[np.ndarray, " lane"]) -> Bool[np.ndarray, " lane"]:
+def is_next_to_singular(point: ExpansionPoint, is_start: Bool[np.ndarray, " lane"]) -> Bool[np.ndarray, " lane"]:
     """Return which motions come close to a singular position at an expansion point, or begin close behind one.
 
     This test is conservative: elsewhere no multiple zero ends a motion, and `singular_positions_outside` finds nothing.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # of failed steps
-        return begins & _is_just_behind(point) | _is_just_ahead(point)
+        return is_start & _is_just_behind(point) | _is_just_ahead(point)
 
 
 def follow(
@@ -192,14 +192,14 @@ def follow(
         path, run = FollowedPath([]), start
     first, path.is_solved = 0, np.zeros(len(grid), bool)
     while not path.anchors or path.anchors[-1].instant < stop:
-        done = solver.take_steps(run, grid[first:], stop, SMALLEST_STEP * span)
-        known = len(path.anchors)
-        path.add(done, first)
-        if path.ended_at_multiple_zero(known, grid, solver.model.drivers):
+        result = solver.take_steps(run, grid[first:], stop, SMALLEST_STEP * span)
+        known_count = len(path.anchors)
+        path.add(result, first)
+        if path.ended_at_multiple_zero(known_count, grid, solver.model.drivers):
             return path
-        run = done.run
+        run = result.run
         if not path.anchors:
-            arrival = jax.tree.map(np.asarray, done.last)
+            arrival = jax.tree.map(np.asarray, result.last)
             return path.ended(Status(int(arrival.status[0])), float(run.instant[0]), solver.fault(arrival, 0))
         last = path.anchors[-1]
         control = run.control
@@ -208,16 +208,16 @@ def follow(
         if ending == StopReason.PASSAGE:
             multiplicity = multiplicity_ahead(path.anchors)
             if multiplicity > SIMPLE_ZERO and last.reach < TOUCHING * last.radius:
-                beyond = float(np.nextafter(last.instant, np.inf))
+                end = float(np.nextafter(last.instant, np.inf))
                 path.hidden = ChangePoint(last.instant + 2 * last.reach, last.radius, 2)
-                return path.ended(Status.SINGULAR, beyond, ", ".join(solver.model.drivers))
-            passed = _far_side(solver, last, multiplicity, stop) if multiplicity <= DOUBLE_ZERO else None
-            if passed is None:
-                no = np.zeros((), bool)
-                control = control._replace(may_pass=no, ending=np.asarray(int(StopReason.UNFINISHED)))
-                run = run._replace(planned=no, control=control)
+                return path.ended(Status.SINGULAR, end, ", ".join(solver.model.drivers))
+            passage = _far_side(solver, last, multiplicity, stop) if multiplicity <= DOUBLE_ZERO else None
+            if passage is None:
+                false = np.zeros((), bool)
+                control = control._replace(may_pass=false, ending=np.asarray(int(StopReason.UNFINISHED)))
+                run = run._replace(planned=false, control=control)
                 continue
-            far_side, change_point = passed
+            far_side, change_point = passage
             path.anchors.append(far_side)
             path.change_points.append(change_point)
             run = solver.run_from(
@@ -225,18 +225,18 @@ def follow(
             )
             first = int(np.searchsorted(grid, far_side.instant, side="right"))
         elif ending == StopReason.COLLAPSED:
-            beyond = float(np.nextafter(last.instant, np.inf))
-            return path.ended(Status.COLLAPSED, beyond, ", ".join(solver.model.drivers))
+            end = float(np.nextafter(last.instant, np.inf))
+            return path.ended(Status.COLLAPSED, end, ", ".join(solver.model.drivers))
         elif ending == StopReason.REFUSED:
-            return _end_path(solver, path, done, span)
+            return _end_path(solver, path, result, span)
     return path
 
 
-def _end_path(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) -> FollowedPath:
+def _end_path(solver: Solver, path: FollowedPath, result: TakenSteps, span: float) -> FollowedPath:
     """End a path that cannot be continued, at the instant where a law was first refused, if any."""
-    last, refused = path.anchors[-1], float(done.run.control.refused)
+    last, refused = path.anchors[-1], float(result.run.control.refused)
     if np.isnan(refused):
-        target, arrival = float(done.run.instant[0]), jax.tree.map(np.asarray, done.last)
+        target, arrival = float(result.run.instant[0]), jax.tree.map(np.asarray, result.last)
     else:
         target, instant = refused, np.array([refused])
         arrival = solver(solver.needed(last.state), instant - last.instant, instant, search=True)
@@ -264,21 +264,21 @@ def _far_side(solver: Solver, near_side: Anchor, estimate: float, stop: float) -
     shortened = jax.tree.map(_shortened, (coordinates, outputs))
     source = (*shortened, np.zeros_like(sign) if multiplicity == 1 else sign)  # at a simple zero the sign may change
     arrival = solver(solver.needed(source), np.array([target - near_side.instant]), np.array([target]), search=True)
-    beyond = Anchor.of(arrival, target)
+    far_side = Anchor.of(arrival, target)
     largest = PASSAGE_DEVIATION if multiplicity == 1 else TOUCH_DEVIATION
     if arrival.status[0] not in PASSABLE or not arrival.deviation[0] <= largest:
         return None
-    since = multiplicity * beyond.reach
-    if not (beyond.det_rate > 0 and abs(since - (target - middle)) <= 0.5 * (target - middle)):
+    distance_past = multiplicity * far_side.reach
+    if not (far_side.det_rate > 0 and abs(distance_past - (target - middle)) <= 0.5 * (target - middle)):
         return None
-    located = 0.5 * (middle + target - since)  # first-order errors of the two sides cancel
-    return beyond, ChangePoint(located, min(near_side.radius, beyond.radius), multiplicity)
+    located = 0.5 * (middle + target - distance_past)  # first-order errors of the two sides cancel
+    return far_side, ChangePoint(located, min(near_side.radius, far_side.radius), multiplicity)
 
 
 def within_steps(times: Float[np.ndarray, " anchor"], count: int) -> Float[np.ndarray, " time"]:
     """Return `count` evenly spaced instants from each anchor to the next, and the last anchor."""
-    since = np.diff(times)[:, None] * (np.arange(count) / count)
-    return np.append((times[:-1, None] + since).ravel(), times[-1])
+    offsets = np.diff(times)[:, None] * (np.arange(count) / count)
+    return np.append((times[:-1, None] + offsets).ravel(), times[-1])
 
 
 def attitudes_between(
@@ -303,11 +303,11 @@ def blended_attitudes(
     error of the other.
     """
     before, after = neighbors
-    whole = times[after] - times[before]
-    share = np.clip((instants - times[before]) / np.where(whole > 0, whole, 1.0), 0.0, 1.0)
-    late, early = share ** len(series), (1.0 - share) ** len(series)
+    durations = times[after] - times[before]
+    fractions = np.clip((instants - times[before]) / np.where(durations > 0, durations, 1.0), 0.0, 1.0)
+    growth, decay = fractions ** len(series), (1.0 - fractions) ** len(series)
     blended = np.zeros((*series.shape[1:-1], len(instants)))
-    for anchor, weight in ((before, early / (early + late)), (after, late / (early + late))):
+    for anchor, weight in ((before, decay / (decay + growth)), (after, growth / (decay + growth))):
         part = np.zeros_like(blended)
         for coefficient in series[::-1]:
             part = part * (instants - times[anchor]) + coefficient[..., anchor]

@@ -49,18 +49,18 @@ def hidden_by_laws(system: System, status: Numbers, instant: Lanes, step: Lanes,
     The series of a motion that begins with a dwell, or as smoothly as ``t**6``, is zero. If the motion returns to its
     start within the step, only these probes notice it.
     """
-    start, shares = instant - step, (np.arange(PROBES) + 0.5) / PROBES
-    near = np.ones(step.shape, bool)
+    start, fractions = instant - step, (np.arange(PROBES) + 0.5) / PROBES
+    is_near = np.ones(step.shape, bool)
     size = SMALLEST_DEPARTURE * jnp.minimum(system.column_scale[0], 1.0)
-    ahead = shares[:, None, None] * step[None, None]
+    offsets = fractions[:, None, None] * step[None, None]
 
-    def values(share: Any) -> list[Any]:
-        return [law.coefficients[0] for law in system.laws(Jet([(start + share * step)[None]]))]
+    def values(fraction: Any) -> list[Any]:
+        return [law.coefficients[0] for law in system.laws(Jet([(start + fraction * step)[None]]))]
 
-    for before, value in zip(system.laws(Jet.variable(start[None], order)), jax.vmap(values)(shares), strict=True):
+    for before, value in zip(system.laws(Jet.variable(start[None], order)), jax.vmap(values)(fractions), strict=True):
         terms = [jnp.where(jnp.isfinite(c), c, 0.0)[None] for c in before.dense().coefficients]
-        departure = jnp.abs(value - Jet(tuple(terms)).evaluate(ahead))
-        allowed = jnp.maximum(0.2 * travel_of([jnp.abs(c) for c in terms[1:]], ahead), size)
-        near &= jnp.all(departure <= allowed, axis=(0, 1))
-    hidden = ~near & (step > FINEST * jnp.abs(instant))  # instants closer than that differ by rounding only
+        departure = jnp.abs(value - Jet(tuple(terms)).evaluate(offsets))
+        allowed = jnp.maximum(0.2 * travel_of([jnp.abs(c) for c in terms[1:]], offsets), size)
+        is_near &= jnp.all(departure <= allowed, axis=(0, 1))
+    hidden = ~is_near & (step > FINEST * jnp.abs(instant))  # instants closer than that differ by rounding only
     return jnp.where((status == int(Status.OK)) & hidden, int(Status.BRANCH_JUMP), status)

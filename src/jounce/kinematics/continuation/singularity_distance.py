@@ -71,13 +71,13 @@ def det_rates_of(
 
 def _slope(system: System, pose: Pose, instant: Float[Numbers, " batch"]) -> Float[Numbers, "entry batch"]:
     """Return the time derivatives of the entries of the Jacobian."""
-    still, moving = pose.truncate(0), pose.truncate(1)
-    rates = each_jet(lambda jet: Jet([jet.dense().coefficients[1]]) if jet.order else None, moving)
+    static_pose, moving_pose = pose.truncate(0), pose.truncate(1)
+    rates = each_jet(lambda jet: Jet([jet.dense().coefficients[1]]) if jet.order else None, moving_pose)
 
-    def entries(still: Any, now: Any) -> Any:
-        return system.entries(still, Jet([now[None]]))
+    def entries(static_pose: Any, time: Any) -> Any:
+        return system.entries(static_pose, Jet([time[None]]))
 
-    return jax.jvp(entries, (still, instant), (rates, jnp.ones_like(instant)))[1]
+    return jax.jvp(entries, (static_pose, instant), (rates, jnp.ones_like(instant)))[1]
 
 
 def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"]:
@@ -85,15 +85,15 @@ def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"
 
     @by_certain_entries()
     def squared(k: Any, carry: Any) -> Any:
-        power, grown = carry
+        power, log_growth = carry
         size = jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)
         scaled = power / size
-        return jax.lax.map(by_certain_entries()(lambda row: row @ scaled), scaled), grown + jnp.log(size) * 0.5**k
+        return jax.lax.map(by_certain_entries()(lambda row: row @ scaled), scaled), log_growth + jnp.log(size) * 0.5**k
 
-    power, grown = jax.lax.fori_loop(0, SQUARINGS, squared, (relative, np.zeros(())))
-    size = jnp.exp(grown + jnp.log(jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)) / 2**SQUARINGS)
-    along, trace = jnp.sum(power * relative.T), jnp.trace(power)
-    return _leading(along / jnp.where(trace == 0, 1.0, trace), size, along, size)[None]
+    power, log_growth = jax.lax.fori_loop(0, SQUARINGS, squared, (relative, np.zeros(())))
+    size = jnp.exp(log_growth + jnp.log(jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)) / 2**SQUARINGS)
+    numerator, trace = jnp.sum(power * relative.T), jnp.trace(power)
+    return _leading(numerator / jnp.where(trace == 0, 1.0, trace), size, numerator, size)[None]
 
 
 def _of_products(
@@ -108,21 +108,21 @@ def _of_products(
     """
 
     def multiplied(_: Any, carry: Any) -> Any:
-        vectors, grown = carry
+        vectors, log_growth = carry
         size = jnp.maximum(jnp.sqrt(jnp.mean(jnp.sum(vectors * vectors, axis=0))), 1e-300)
-        return product(vectors / size), grown + jnp.log(size)
+        return product(vectors / size), log_growth + jnp.log(size)
 
     start = np.random.default_rng(0).standard_normal((columns, PROBES))
     power = 2**SQUARINGS
-    vectors, grown = jax.lax.fori_loop(0, power, multiplied, (start / np.sqrt(columns), np.zeros(())))
+    vectors, log_growth = jax.lax.fori_loop(0, power, multiplied, (start / np.sqrt(columns), np.zeros(())))
     square = jnp.sum(vectors * vectors)
     norm = jnp.log(jnp.maximum(jnp.sqrt(square / PROBES * columns), 1e-300))
-    size = jnp.exp((grown + norm) / power)
-    along = jnp.sum(vectors * product(vectors))
-    return _leading(along / jnp.where(square == 0, 1.0, square), size, along, size / 0.8)[None]
+    size = jnp.exp((log_growth + norm) / power)
+    numerator = jnp.sum(vectors * product(vectors))
+    return _leading(numerator / jnp.where(square == 0, 1.0, square), size, numerator, size / 0.8)[None]
 
 
-def _leading(eigenvalue: Real, size: Real, along: Real, bound: Real) -> Any:
+def _leading(eigenvalue: Real, size: Real, numerator: Real, bound: Real) -> Any:
     """Return the eigenvalue if it is real and dominant, as near a singular position; else a bound with its sign."""
-    leads = (jnp.abs(eigenvalue) > 0.7 * size) & (jnp.abs(eigenvalue) <= bound)
-    return jnp.where(leads, eigenvalue, jnp.where(along < 0, -bound, bound))
+    dominates = (jnp.abs(eigenvalue) > 0.7 * size) & (jnp.abs(eigenvalue) <= bound)
+    return jnp.where(dominates, eigenvalue, jnp.where(numerator < 0, -bound, bound))

@@ -53,34 +53,34 @@ class Solver:
 
     def __call__(
         self,
-        needed: SolvedState,
+        source_data: SolvedState,
         step: Float[np.ndarray, " batch"],
         instant: Float[np.ndarray, " batch"],
         *,
         search: bool = False,
     ) -> StepResult:
-        """Solve instants from the `needed` data of solved ones.
+        """Solve instants from the data of solved ones.
 
         With few instants, `search` has the meaning it has in `advance`.
         """
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
-            source, step, instant = jax.tree.map(lambda x: padded(x, SMALL_BATCH), (needed, step, instant))
+            source, step, instant = jax.tree.map(lambda x: padded(x, SMALL_BATCH), (source_data, step, instant))
             run = _run_from(source, (0.0,) * 4, step=step, instant=instant)
             arrival = self._take_steps(run, NO_GRID, 1, search=search).last
         else:
-            arrival = self.program((needed, step, instant, None, np.zeros(step.shape, bool)))
+            arrival = self.program((source_data, step, instant, None, np.zeros(step.shape, bool)))
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
 
     def still(self, coordinates: Mapping[str, Any], lanes: int | None = None) -> SolvedState:
         """Return the state of an unsolved position, with zero derivatives; or `lanes` copies of it."""
         levels, system = self.order + 1, self.model.system
         count: int = np.shape(coordinates["position"])[-1] if lanes is None else lanes
-        still = {name: np.zeros((levels, *np.shape(x)[:-1], count)) for name, x in coordinates.items()}
+        jets = {name: np.zeros((levels, *np.shape(x)[:-1], count)) for name, x in coordinates.items()}
         for name, x in coordinates.items():
-            still[name][0] = x
+            jets[name][0] = x
         outputs = tuple(np.zeros((levels, 1, group.instances, count)) for group in system.outputs)
-        return still, outputs, np.zeros(count)
+        return jets, outputs, np.zeros(count)
 
     def needed(self, solved: SolvedState) -> SolvedState:
         """Return the data of solved instants from which others are predicted, see `predictor`."""
@@ -94,7 +94,7 @@ class Solver:
         instant: Float[np.ndarray, " time"],
         status: Int[np.ndarray, " time"],
         sources: Int[np.ndarray, " time"],
-        own: Mapping[int, np.ndarray] | None,
+        design: Mapping[int, np.ndarray] | None,
     ) -> Rounds:
         """Return a runner that solves instants of a grid in rounds.
 
@@ -111,17 +111,17 @@ class Solver:
             Array for the outcome of each instant.
         sources : array of int, shape (time,)
             Index in `sources_data` of the source of each instant; below zero for its lane in the round before.
-        own : dict of int to array
+        design : dict of int to array
             Values of the design of each instant (see `of_design`), or None for one design.
         """
         coordinates, outputs, sign = state
-        nothing: dict[str, Any] = dict.fromkeys(StepResult._fields)
+        blank: dict[str, Any] = dict.fromkeys(StepResult._fields)
         results = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
-        results = StepResult(**(nothing | results))
+        results = StepResult(**(blank | results))
         leaves, form = jax.tree.flatten(results, is_leaf=lambda x: x is None)
         numbered: Any = jax.tree.unflatten(form, np.arange(len(leaves))[:, None])
         links = [int(x[0]) for x in jax.tree.leaves(self.needed(numbered.state(slice(None))))]
-        return self.program.rounds((sources_data, (step, instant, own), np.zeros(1, bool)), results, sources, links)
+        return self.program.rounds((sources_data, (step, instant, design), np.zeros(1, bool)), results, sources, links)
 
     def take_steps(self, run: StepState, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> TakenSteps:
         """Continue a run, and solve the next grid instants as far as they fit; see `continuation_steps`."""
@@ -177,14 +177,14 @@ class Solver:
     def program(self) -> OnLlvm | OnXla:
         """The program that solves many instants."""
         system = self.model.system
-        nothing, still = np.zeros(1), self.still(self.model.guess)
-        instants = self.needed(still), nothing, nothing, self.own, np.zeros(1, bool)
+        zeros, state = np.zeros(1), self.still(self.model.guess)
+        instants = self.needed(state), zeros, zeros, self.own, np.zeros(1, bool)
         small = system.shape[1] <= FEW_COLUMNS
         laws = [getattr(group.element, "motion", ()) for group in system.groups]
         tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
-        how: dict[str, Any] = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE}
-        how |= {"width": partial(round_width, system), "pose_type": self.model.pose_type, "order": self.order}
-        return advance_instant.program((system, self._settings), instants, **how)
+        options: dict[str, Any] = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE}
+        options |= {"width": partial(round_width, system), "pose_type": self.model.pose_type, "order": self.order}
+        return advance_instant.program((system, self._settings), instants, **options)
 
     @cached_property
     def _batches(self) -> int:
@@ -204,7 +204,7 @@ class Solver:
         self,
         run: StepState,
         grid: Float[np.ndarray, " time"],
-        most: int,
+        batch_limit: int,
         *,
         stop: float = 0.0,
         smallest: float = 0.0,
@@ -216,10 +216,10 @@ class Solver:
         window[: len(grid)] = grid[:length]
         call = take_steps.prepare if only_made else take_steps
         native = WhenMade(lambda: self.program.name if isinstance(self.program, OnLlvm) else None)
-        how = {"pose_type": self.model.pose_type, "order": self.order, "batches": self._batches, "native": native}
+        options = {"pose_type": self.model.pose_type, "order": self.order, "batches": self._batches, "native": native}
         limits = StepLimits(np.asarray(stop), np.asarray(smallest))
-        bounds = limits, self._settings, np.asarray(search), np.asarray(most)
-        return call(self.model.system, run, window, *bounds, **how)
+        bounds = limits, self._settings, np.asarray(search), np.asarray(batch_limit)
+        return call(self.model.system, run, window, *bounds, **options)
 
     def fault(self, arrival: StepResult, lane: int) -> str:
         """Return the origin of a failure: a driver without a permitted value, an output, or the farthest body."""
@@ -235,11 +235,11 @@ class Solver:
 
     def _contradicting(self, gaps: Float[np.ndarray, "2 row"]) -> str:
         """Return the joints and drivers that contradict each other, with the size of their gap, in words."""
-        size, over = gaps
-        largest = [self.model.rows[k] for k in np.argsort(-over) if over[k] > 0.1 * over.max()]
+        size, ratios = gaps
+        largest = [self.model.rows[k] for k in np.argsort(-ratios) if ratios[k] > 0.1 * ratios.max()]
         names = dict.fromkeys(sorted(largest, key=lambda name: name not in self.model.drivers))  # drivers first
-        wide = size.max()
-        phrase = f"open by {wide:.2g} rad, or sizes of the mechanism" if wide > LARGEST_GAP else "in their rates"
+        gap = size.max()
+        phrase = f"open by {gap:.2g} rad, or sizes of the mechanism" if gap > LARGEST_GAP else "in their rates"
         return f"{', '.join(list(names)[:4])} ({phrase})"
 
 
@@ -253,9 +253,9 @@ def _run_from(
     crawled: int = 0,
 ) -> StepState:
     """Return a run at its beginning, with its first step, if given."""
-    nothing = np.zeros(SMALL_BATCH)
-    instants = nothing if instant is None else instant
+    zeros = np.zeros(SMALL_BATCH)
+    instants = zeros if instant is None else instant
     control = initial_control(ExpansionPoint(*map(np.asarray, expansion_point)), np.asarray(instants[0]))
     control = control._replace(largest=np.asarray(largest), crawled=np.asarray(crawled))
     decided, first = np.asarray(instant is not None), np.zeros((), int)
-    return StepState(source, control, nothing if step is None else step, instants, decided, first, NOWHERE)
+    return StepState(source, control, zeros if step is None else step, instants, decided, first, NOWHERE)

@@ -81,29 +81,29 @@ def initial_control(point: ExpansionPoint, target: Float[np.ndarray, "*batch"]) 
     """Return the control that solves the first instant, s, itself; or, at a known expansion point, has no step yet."""
     blank = np.zeros(target.shape)
     none = np.zeros(target.shape, int)
-    yes, far, unknown = (np.full(target.shape, value) for value in (True, np.inf, np.nan))
-    return StepControl(point, blank, target, yes, far, none, unknown, none)
+    allowed, infinite, undefined = (np.full(target.shape, value) for value in (True, np.inf, np.nan))
+    return StepControl(point, blank, target, allowed, infinite, none, undefined, none)
 
 
 def plan_next_step(control: StepControl, limits: StepLimits) -> StepControl:
     """Plan the next step from an expansion point, or end the run with a reason."""
     point = control.expansion_point
-    left = limits.stop - point.instant
-    step = jnp.minimum(jnp.minimum(point.safe_step, SAFE_FRACTION * point.reach), jnp.minimum(control.largest, left))
-    crawled = jnp.where(step < CRAWLING * left, control.crawled + 1, 0)
+    span = limits.stop - point.instant
+    step = jnp.minimum(jnp.minimum(point.safe_step, SAFE_FRACTION * point.reach), jnp.minimum(control.largest, span))
+    crawled = jnp.where(step < CRAWLING * span, control.crawled + 1, 0)
     singular = control.may_pass & (point.det_rate < 0) & (point.reach < PASSAGE * point.radius)
     endings = (
         ((crawled > LONGEST_CRAWL) | (point.instant + step == point.instant), StopReason.COLLAPSED),
         (singular, StopReason.PASSAGE),
-        (~(left > 0), StopReason.ARRIVED),
+        (~(span > 0), StopReason.ARRIVED),
     )
-    ending = jnp.full(left.shape, int(StopReason.UNFINISHED))
-    for happened, why in endings:
-        ending = jnp.where(happened, int(why), ending)
-    step = jnp.where(left - step < SLIVER * step, left, step)
-    target = jnp.where(step == left, limits.stop, point.instant + step)
+    ending = jnp.full(span.shape, int(StopReason.UNFINISHED))
+    for condition, reason in endings:
+        ending = jnp.where(condition, int(reason), ending)
+    step = jnp.where(span - step < SLIVER * step, span, step)
+    target = jnp.where(step == span, limits.stop, point.instant + step)
     crawled = jnp.where(ending == StopReason.PASSAGE, control.crawled, crawled)  # the step is planned again
-    refused = jnp.full(left.shape, jnp.nan)
+    refused = jnp.full(span.shape, jnp.nan)
     return control._replace(step=step, target=target, ending=ending, crawled=crawled, refused=refused)
 
 
@@ -118,27 +118,27 @@ def next_control(
     status: Int[Numbers, "*batch"],
     end_point: ExpansionPoint,
     limits: StepLimits,
-    good: Truths,
+    accepted: Truths,
     taken: Truths,
 ) -> StepControl:
-    """Return the control after a step that was accepted (`good`) and made the next anchor (`taken`), or not.
+    """Return the control after a step that was `accepted` or not, and made the next anchor (`taken`) or not.
 
     An accepted step that was not taken is repeated for more grid instants.
     """
-    stuck = ~good & ((control.step < limits.smallest) | (control.target <= control.expansion_point.instant))
-    inadmissible = ~good & (status == int(Status.INADMISSIBLE)) & jnp.isnan(control.refused)
+    stuck = ~accepted & ((control.step < limits.smallest) | (control.target <= control.expansion_point.instant))
+    inadmissible = ~accepted & (status == int(Status.INADMISSIBLE)) & jnp.isnan(control.refused)
     control = control._replace(
         ending=jnp.where(stuck, int(StopReason.REFUSED), int(StopReason.UNFINISHED)),
         refused=jnp.where(inadmissible, control.target, control.refused),
     )
     largest = jnp.where(control.step == 0, control.largest, GROWTH * control.step)
     arrived = control._replace(expansion_point=end_point, may_pass=jnp.ones_like(taken), largest=largest)
-    halved = ~good & ~stuck
+    halved = ~accepted & ~stuck
     step = jnp.where(halved, 0.5 * control.step, control.step)
-    again = control._replace(
+    repeated = control._replace(
         step=step, target=jnp.where(halved, control.expansion_point.instant + step, control.target)
     )
-    return jax.tree.map(lambda new, old: jnp.where(taken, new, old), plan_next_step(arrived, limits), again)
+    return jax.tree.map(lambda new, old: jnp.where(taken, new, old), plan_next_step(arrived, limits), repeated)
 
 
 @mapped()
@@ -155,5 +155,5 @@ def next_controls(
         For each design, the step made, its status, and the expansion point at its end.
     """
     control, status, end_point = lanes
-    good = is_accepted(control, status, end_point)
-    return next_control(control, status, end_point, limits, good, good), good
+    accepted = is_accepted(control, status, end_point)
+    return next_control(control, status, end_point, limits, accepted, accepted), accepted

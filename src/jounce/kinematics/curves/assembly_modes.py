@@ -229,9 +229,9 @@ class _Search:
 
     def from_starts(self, count: int, random: np.random.Generator) -> None:
         """Assemble from random starts until each assembly was found often enough."""
-        most = MOST_ROUNDS * count
-        while self.starts < count or (self.starts < most and any(x.hits < OFTEN for x in self.configurations)):
-            self._round(min(BATCH, most - self.starts), random)
+        start_limit = MOST_ROUNDS * count
+        while self.starts < count or (self.starts < start_limit and any(x.hits < OFTEN for x in self.configurations)):
+            self._round(min(BATCH, start_limit - self.starts), random)
         if not self.configurations and not self.movable:
             check_assembled(self.first, self.attempt, self.instant)
             raise AssemblyError(f"no assembly was found from {self.starts} starts at t = {self.instant:g} s")
@@ -272,8 +272,8 @@ class _Search:
             angle[1:] += random.uniform(-np.pi, np.pi, size=angle[1:].shape)
             return {"position": position, "angle": angle}
         quaternion = np.repeat(np.asarray(guess["quaternion"], float), BATCH, axis=-1)
-        turned = random.normal(size=quaternion[:, 1:].shape)
-        quaternion[:, 1:] = turned / np.linalg.norm(turned, axis=0)
+        samples = random.normal(size=quaternion[:, 1:].shape)
+        quaternion[:, 1:] = samples / np.linalg.norm(samples, axis=0)
         return {"position": position, "quaternion": quaternion}
 
     def add(self, coordinates: dict[str, np.ndarray], hits: int = 1) -> bool:
@@ -282,8 +282,8 @@ class _Search:
         if not np.array_equal(axis_signs(self.system, batch), self.axis_signs):
             return False
         for known in self.configurations:
-            same = SAME if known.smallest > NEARLY_SINGULAR else SAME_IF_SINGULAR
-            if np.max(np.abs(self.tracker.difference(coordinates, known.coordinates))) < same:
+            tolerance = SAME if known.smallest > NEARLY_SINGULAR else SAME_IF_SINGULAR
+            if np.max(np.abs(self.tracker.difference(coordinates, known.coordinates))) < tolerance:
                 known.hits += hits
                 return False
         coordinates = self._polished(coordinates)

@@ -47,17 +47,17 @@ def _guesses(mechanism: Mechanism, picked: Assembly) -> dict:
 
 def _by_wish(candidates: Assemblies, wish: Mapping[str, str]) -> Assembly:
     """Return the assembly in which each body lies farthest toward its side; the first body has priority."""
-    left = list(candidates)
+    remaining = list(candidates)
     for body, side in wish.items():
         axis, sign = SIDES[side]
-        sizes = np.array([sign * _middle(assembly.mechanism, body)[axis] for assembly in left])
-        least = sizes.max() - DIFFERENT * build(left[0].mechanism).length
-        left = [x for x, size in zip(left, sizes, strict=True) if size > least]
-    if len(left) > 1:
-        numbers = " and ".join(str(x.number) for x in left)
+        sizes = np.array([sign * _middle(assembly.mechanism, body)[axis] for assembly in remaining])
+        lower_bound = sizes.max() - DIFFERENT * build(remaining[0].mechanism).length
+        remaining = [x for x, size in zip(remaining, sizes, strict=True) if size > lower_bound]
+    if len(remaining) > 1:
+        numbers = " and ".join(str(x.number) for x in remaining)
         message = f"assemblies {numbers} fit equally well: add the side of another body, or give a number"
         raise AssemblyError(message, name="assembly", value=dict(wish))
-    return left[0]
+    return remaining[0]
 
 
 def _middle(mechanism: Mechanism, body: str) -> np.ndarray:

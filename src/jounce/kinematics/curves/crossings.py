@@ -53,8 +53,8 @@ class ChangePoint:
     decided: bool
 
     def __repr__(self) -> str:
-        where = f"arc length {self.arc_length:.6g}, driver value {self.center.value[0]:.6g}"
-        return f"<ChangePoint at {where}, {len(self.tangents)} branches>"
+        place = f"arc length {self.arc_length:.6g}, driver value {self.center.value[0]:.6g}"
+        return f"<ChangePoint at {place}, {len(self.tangents)} branches>"
 
     @property
     def arc_length(self) -> float:
@@ -79,25 +79,25 @@ def crossing(tracker: PathTracker, before: CurvePoint, ahead: complex) -> tuple[
     ahead : complex
         Signed arc length to the nearest singular point, to first order.
     """
-    near = NEAR * tracker.radius(before, PASSAGE_ORDER - 2)
-    if not (0 < ahead.real < near and abs(ahead.imag) <= REAL * ahead.real):
+    limit = NEAR * tracker.radius(before, PASSAGE_ORDER - 2)
+    if not (0 < ahead.real < limit and abs(ahead.imag) <= REAL * ahead.real):
         return None
-    short = before.shortened(PASSAGE_ORDER)
-    point = _located(tracker, short, ahead.real)
+    shortened = before.shortened(PASSAGE_ORDER)
+    point = _located(tracker, shortened, ahead.real)
     if point is None:
         return None
     step = point.arc_length - before.arc_length
-    points = tracker.points(short, np.array([2 * step]))
+    points = tracker.points(shortened, np.array([2 * step]))
     beyond = tracker.point_at_lane(points, 0, before.arc_length + 2 * step, before.rows)
-    arrived = {name: c[0] for name, c in beyond.coordinates.items()}
-    departure = tracker.difference(arrived, short.at(2 * step))
+    coordinates = {name: c[0] for name, c in beyond.coordinates.items()}
+    departure = tracker.difference(coordinates, shortened.at(2 * step))
     if not all_finite(points)[0] or np.max(np.abs(departure)) > LARGEST_DEPARTURE:
         return None
     null = tracker.null_space(point.jacobian, NEARLY_SINGULAR)
-    own = tracker.tangent(point)
-    if null.shape[1] < 2 or float(own @ tracker.tangent(beyond)) < 0:
+    tangent = tracker.tangent(point)
+    if null.shape[1] < 2 or float(tangent @ tracker.tangent(beyond)) < 0:
         return None
-    tangents, decided = _tangents(tracker, point, null, own)
+    tangents, decided = _tangents(tracker, point, null, tangent)
     return ChangePoint(point, tangents, null.shape[1], decided), beyond
 
 
@@ -122,21 +122,21 @@ def departed(tracker: PathTracker, change_point: ChangePoint, branch: int) -> Cu
     raise SolveError(message, status=Status.SINGULAR)
 
 
-def _located(tracker: PathTracker, short: CurvePoint, step: float) -> CurvePoint | None:
+def _located(tracker: PathTracker, shortened: CurvePoint, step: float) -> CurvePoint | None:
     """Return the point on the series at which the bordered Jacobian is singular, if its residual vanishes."""
 
     def at(step: float) -> tuple[CurvePoint, float]:
-        points = tracker.points(short, np.array([step]), corrected=False)
-        known = {"jacobian": points.jacobian[..., 0], "slope": points.slope[..., 0]}
-        return dataclasses.replace(short.recentered(step, PASSAGE_ORDER), **known), float(points.residual[0])
+        points = tracker.points(shortened, np.array([step]), corrected=False)
+        derivatives = {"jacobian": points.jacobian[..., 0], "slope": points.slope[..., 0]}
+        return dataclasses.replace(shortened.recentered(step, PASSAGE_ORDER), **derivatives), float(points.residual[0])
 
     first = step
     point, residual = at(step)
     for _ in range(MAX_CORRECTIONS):
-        ahead = tracker.singularity_distance(point)
-        if abs(ahead) < LOCATED * first:
+        distance = tracker.singularity_distance(point)
+        if abs(distance) < LOCATED * first:
             break
-        step += ahead.real
+        step += distance.real
         if not abs(step - first) < 0.5 * first:
             return None
         point, residual = at(step)
@@ -144,36 +144,39 @@ def _located(tracker: PathTracker, short: CurvePoint, step: float) -> CurvePoint
 
 
 def _tangents(
-    tracker: PathTracker, point: CurvePoint, null: Float[np.ndarray, "unknown k"], own: Float[np.ndarray, " unknown"]
+    tracker: PathTracker,
+    point: CurvePoint,
+    null: Float[np.ndarray, "unknown k"],
+    tangent: Float[np.ndarray, " unknown"],
 ) -> tuple[Float[np.ndarray, "branch unknown"], bool]:
     """Return the directions of all branches that the second order allows, and whether it distinguishes them."""
     rows = tracker.left_null_space(point.jacobian, NEARLY_SINGULAR)
     # second-order forms of the vanishing combinations of rows, on directions of the first order
-    forms = polarized(lambda along: rows.T @ tracker.second_order(point, null @ along.T), null.shape[1])
+    forms = polarized(lambda directions: rows.T @ tracker.second_order(point, null @ directions.T), null.shape[1])
     size = np.max(np.abs(forms), initial=0.0)
-    known = null.T @ own
+    components = null.T @ tangent
     if not size > VANISHING:
-        return own[None], False
+        return tangent[None], False
     zeros, decided = _common_zeros(forms / size)
-    along = [x for x in zeros if abs(x @ known) < (1 - SAME_DIRECTION) * np.linalg.norm(known)]
-    decided &= len(along) < len(zeros)  # the followed branch is among the zeros
-    others = [null @ x for x in along]
+    directions = [x for x in zeros if abs(x @ components) < (1 - SAME_DIRECTION) * np.linalg.norm(components)]
+    decided &= len(directions) < len(zeros)  # the followed branch is among the zeros
+    others = [null @ x for x in directions]
     scaled = [x / np.linalg.norm(x[: tracker.columns]) for x in others]
-    return np.stack([own, *scaled]), decided
+    return np.stack([tangent, *scaled]), decided
 
 
 def _common_zeros(forms: Float[np.ndarray, "form k k"]) -> tuple[list[np.ndarray], bool]:
     """Return unit vectors, up to sign, on which all forms vanish, and whether all of these are isolated."""
     count = forms.shape[1]
     single: list[np.ndarray] = []
-    several: list[np.ndarray] = []
+    multiple: list[np.ndarray] = []
     starts = np.random.default_rng(0).standard_normal((STARTS * count, count))
     for x in common_zeros(forms, starts, ROUNDING, steps=STEPS, longest=LONGEST_STEP):
         sizes = np.linalg.svd(np.concatenate([2 * forms @ x, x[None]]), compute_uv=False)
         is_single = len(sizes) == count and bool(sizes[-1] > LEAST_ANGLE)
-        zeros, least_angle = (single, SAME_DIRECTION) if is_single else (several, LEAST_ANGLE)
+        zeros, least_angle = (single, SAME_DIRECTION) if is_single else (multiple, LEAST_ANGLE)
         if all(abs(x @ other) < 1 - least_angle for other in zeros):
             zeros.append(x)
-    if len(several) > MOST_MULTIPLE:
+    if len(multiple) > MOST_MULTIPLE:
         return single, False  # a surface of zeros
-    return [*single, *several], not several
+    return [*single, *multiple], not multiple

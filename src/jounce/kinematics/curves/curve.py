@@ -166,10 +166,10 @@ class Curve(Displayed):
 
     def value(self, arc_length: float) -> float:
         """Return the value of the driver at an arc length."""
-        around, turned = 0.0, self._around(arc_length)
+        gain, reduced = 0.0, self._around(arc_length)
         if self.closed and self.driver is not None:
-            around = (arc_length - turned) / self.length * self._gain
-        return float(self._at(turned).value[0]) + around
+            gain = (arc_length - reduced) / self.length * self._gain
+        return float(self._at(reduced).value[0]) + gain
 
     @cached_property
     def _gain(self) -> float:
@@ -183,10 +183,10 @@ class Curve(Displayed):
 
     def _at(self, arc_length: float) -> CurvePoint:
         """Return the point at an arc length by the series of the nearest solved point."""
-        known = [point.arc_length for point in self._track]
-        after = bisect.bisect_left(known, arc_length)
-        near = min(self._track[max(after - 1, 0) : after + 1], key=lambda p: abs(p.arc_length - arc_length))
-        return near.recentered(arc_length - near.arc_length)
+        arc_lengths = [point.arc_length for point in self._track]
+        after = bisect.bisect_left(arc_lengths, arc_length)
+        nearest = min(self._track[max(after - 1, 0) : after + 1], key=lambda p: abs(p.arc_length - arc_length))
+        return nearest.recentered(arc_length - nearest.arc_length)
 
     def at(self, arc_length: float) -> Mechanism:
         """Return the mechanism with the configuration at an arc length as its starting guess.
@@ -212,8 +212,8 @@ class Curve(Displayed):
     def branch_at(self, arc_length: float) -> int:
         """Return the number, from 1, of the branch at an arc length."""
         for number, branch in enumerate(self.branches, start=1):
-            around = (arc_length, arc_length - self.length) if self.closed else (arc_length,)
-            if any(branch.start <= s <= branch.stop for s in around):
+            candidates = (arc_length, arc_length - self.length) if self.closed else (arc_length,)
+            if any(branch.start <= s <= branch.stop for s in candidates):
                 return number
         return 1
 
@@ -230,15 +230,15 @@ class Curve(Displayed):
     def connected(self) -> tuple["Curve", ...]:
         """Return the whole circuit: this curve and all curves connected with it by change points."""
         curves: list[Curve] = [self]
-        waiting: list[Curve] = [self]
-        while waiting and len(curves) < MOST_CURVES:
-            curve = waiting.pop()
+        pending: list[Curve] = [self]
+        while pending and len(curves) < MOST_CURVES:
+            curve = pending.pop()
             for number, point in enumerate(curve.change_points):
                 for branch in range(1, len(point.tangents)):
                     other = curve.follow(number, branch)
                     if not any(known.passes(other.coordinates_at(0.0)) for known in curves):
                         curves.append(other)
-                        waiting.append(other)
+                        pending.append(other)
         return tuple(curves)
 
     def follow(self, change_point: int, branch: int = 1) -> "Curve":
@@ -304,10 +304,10 @@ class Curve(Displayed):
     def _motion(self) -> Motion:
         """The curve as a motion with arc length in the place of time, which evaluates outputs."""
         posed_outputs = {k: v for k, v in self.mechanism.outputs.items() if not isinstance(v, AbstractMotionOutput)}
-        taken = set(posed_outputs) & set(AXES)
-        if taken:
-            message = f"the name '{min(taken)}' is that of an axis of a curve"
-            raise MechanismError(message, name=f"outputs.{min(taken)}")
+        conflicts = set(posed_outputs) & set(AXES)
+        if conflicts:
+            message = f"the name '{min(conflicts)}' is that of an axis of a curve"
+            raise MechanismError(message, name=f"outputs.{min(conflicts)}")
         mechanism = dataclasses.replace(self._free.mechanism, outputs=posed_outputs)
         order = self._settings.order
         levels = order + lost_orders(posed_outputs.values()) + 1
@@ -357,11 +357,11 @@ class Curve(Displayed):
         with respect to arc length. Limit positions and change points are among the points.
         """
         dataset = self._motion.dataset.rename(time="point")
-        known = {"arc_length": ("point", self.arc_lengths, {"units": "1", "long_name": "arc length"})}
+        coordinates = {"arc_length": ("point", self.arc_lengths, {"units": "1", "long_name": "arc length"})}
         if self.driver is not None:
             attributes = {"units": self.unit, "long_name": f"value of the driver {self.driver}"}
-            known["driver_value"] = ("point", self.values[:, 0], attributes)
-        dataset = dataset.assign_coords({"point": np.arange(len(self.arc_lengths)), **known})
+            coordinates["driver_value"] = ("point", self.values[:, 0], attributes)
+        dataset = dataset.assign_coords({"point": np.arange(len(self.arc_lengths)), **coordinates})
         dataset["derivative"].attrs = {"long_name": "order of the derivative with respect to arc length"}
         dataset.attrs |= {"title": self.mechanism.title or "curve of a mechanism", "closed": int(self.closed)}
         dataset.attrs |= {"limit_positions": np.array([x.value for x in self.limits])}
@@ -381,9 +381,9 @@ def curve_through(
     return Curve(mechanism, free, tracker, track_both_directions(tracker, start, settings.length), settings)
 
 
-def _one_of(items: Any, number: Any, name: str, what: str) -> Any:
+def _one_of(items: Any, number: Any, name: str, noun: str) -> Any:
     """Return an item by index, or raise MechanismError."""
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(items):
         range_words = f"there are {len(items)}, counted from 0" if len(items) else "there are none"
-        raise MechanismError(f"no such one among the {what}: {range_words}", name=name, value=number)
+        raise MechanismError(f"no such one among the {noun}: {range_words}", name=name, value=number)
     return items[number]

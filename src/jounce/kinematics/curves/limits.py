@@ -123,7 +123,7 @@ def values_between(point: CurvePoint, stop: float, value: float, period: float |
         return []
     targets = [value]
     if period is not None:
-        least, most = ((terms[0] + side * reach - value) / period for side in (-1, 1))
-        targets = [value + period * k for k in range(int(np.floor(least)), int(np.ceil(most)) + 1)]
+        lowest, highest = ((terms[0] + side * reach - value) / period for side in (-1, 1))
+        targets = [value + period * k for k in range(int(np.floor(lowest)), int(np.ceil(highest)) + 1)]
     steps = [part for target in targets for part in roots(np.array([terms[0] - target, *terms[1:]]))]
     return [point.arc_length + part * step for part in steps]

@@ -73,10 +73,10 @@ def track(tracker: PathTracker, start: CurvePoint, length: float) -> Path:
             if isinstance(next_point, End):
                 path.end = next_point
                 break
-        reach = next_point.arc_length - point.arc_length
-        back = _closing_step(tracker, point, start, reach) if len(path.points) > 1 else None
-        if back is not None:
-            path.end, path.length = End.CLOSED, point.arc_length + back - start.arc_length
+        step = next_point.arc_length - point.arc_length
+        closing_step = _closing_step(tracker, point, start, step) if len(path.points) > 1 else None
+        if closing_step is not None:
+            path.end, path.length = End.CLOSED, point.arc_length + closing_step - start.arc_length
             break
         path.points.append(next_point)
         point = next_point
@@ -85,9 +85,9 @@ def track(tracker: PathTracker, start: CurvePoint, length: float) -> Path:
     return path
 
 
-def _next_point(tracker: PathTracker, point: CurvePoint, reach: float) -> CurvePoint | End:
+def _next_point(tracker: PathTracker, point: CurvePoint, distance: float) -> CurvePoint | End:
     """Return the next accepted point, or the reason for the end of the curve."""
-    step = min(tracker.radius(point) * TAIL ** (1 / ORDER), SHARE_OF_DISTANCE * reach)
+    step = min(tracker.radius(point) * TAIL ** (1 / ORDER), SHARE_OF_DISTANCE * distance)
     parts = np.arange(1, LANES + 1) / LANES
     end = End.SINGULAR
     if not np.isfinite(step):
@@ -109,9 +109,9 @@ def _accepted(
     tracker: PathTracker, point: CurvePoint, points: CurvePoints, sign: float, correction: float
 ) -> Bool[np.ndarray, " lane"]:
     """Return which points are on the curve of the series, and on the same branch."""
-    good = all_finite(points) & points.admissible & (points.residual <= LARGEST_RESIDUAL)
-    good &= (points.first <= LARGEST_DEPARTURE) & (points.last <= correction)
-    return good & (tracker.signs(points, point.rows) == sign)
+    accepted = all_finite(points) & points.admissible & (points.residual <= LARGEST_RESIDUAL)
+    accepted &= (points.first <= LARGEST_DEPARTURE) & (points.last <= correction)
+    return accepted & (tracker.signs(points, point.rows) == sign)
 
 
 def _closing_step(tracker: PathTracker, point: CurvePoint, start: CurvePoint, length: float) -> float | None:
@@ -121,8 +121,8 @@ def _closing_step(tracker: PathTracker, point: CurvePoint, start: CurvePoint, le
         return None
     if tracker.timed and abs(polyval(step, point.value) - start.value[0]) > NEGLIGIBLE * tracker.value_scale:
         return None
-    ahead, first = (tracker.tangent(point)[: tracker.columns] for point in (point.recentered(step), start))
-    return step if float(ahead @ first) > 1 - SAME_DIRECTION else None
+    tangent, start_tangent = (tracker.tangent(point)[: tracker.columns] for point in (point.recentered(step), start))
+    return step if float(tangent @ start_tangent) > 1 - SAME_DIRECTION else None
 
 
 def step_to_configuration(

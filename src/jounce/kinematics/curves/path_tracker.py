@@ -127,9 +127,9 @@ class PathTracker:
             series[name][0] = np.asarray(x)[..., 0]
         values = np.zeros(ORDER + 1)
         values[0] = value
-        nothing = np.zeros((self.model.system.shape[0], self.unknowns))
-        first = np.arange(self.unknowns - 1) % max(1, len(nothing))
-        return self.with_jacobian(CurvePoint(0.0, series, values, nothing, nothing, first))
+        blank = np.zeros((self.model.system.shape[0], self.unknowns))
+        rows = np.arange(self.unknowns - 1) % max(1, len(blank))
+        return self.with_jacobian(CurvePoint(0.0, series, values, blank, blank, rows))
 
     def with_jacobian(self, point: CurvePoint) -> CurvePoint:
         """Return a point with the Jacobian of its configuration and its independent rows."""
@@ -142,12 +142,12 @@ class PathTracker:
         """Return a point whose series is a straight line in a direction."""
         pose_type = self.model.pose_type
         shift, turn = self.parts(direction)
-        first = {"position": shift, "angle": turn[0]} if pose_type is PlanarPose else {"position": shift}
+        rates = {"position": shift, "angle": turn[0]} if pose_type is PlanarPose else {"position": shift}
         if "quaternion" in point.coordinates:
-            first["quaternion"] = np.asarray(quaternion_change(point.coordinates["quaternion"][0], turn))
+            rates["quaternion"] = np.asarray(quaternion_change(point.coordinates["quaternion"][0], turn))
         series = {name: np.zeros_like(c) for name, c in point.coordinates.items()}
         for name, c in point.coordinates.items():
-            series[name][0], series[name][1] = c[0], first[name]
+            series[name][0], series[name][1] = c[0], rates[name]
         value = np.zeros_like(point.value)
         value[0] = point.value[0]
         value[1] = direction[-1] * self.value_scale if self.driven else 0.0
@@ -200,18 +200,18 @@ class PathTracker:
         corrected: bool = True,
     ) -> CurvePoints:
         """Return points of the curve at steps from one center, or one step each from several with the same rows."""
-        several = [centers] if isinstance(centers, CurvePoint) else centers
-        rows, count = several[0].rows, len(steps)
+        center_list = [centers] if isinstance(centers, CurvePoint) else centers
+        rows, count = center_list[0].rows, len(steps)
 
         def lanes(parts: list[np.ndarray]) -> np.ndarray:
             return padded(np.stack(parts, axis=-1), LANES)
 
-        coordinates = {name: lanes([p.coordinates[name] for p in several]) for name in several[0].coordinates}
-        directions = [self.tangent(p)[: self.columns] for p in several] if tangent is None else [tangent]
-        ahead = lanes(directions), padded(steps, LANES)
-        given = coordinates, lanes([p.value for p in several]), *ahead, np.asarray(corrected)
+        coordinates = {name: lanes([p.coordinates[name] for p in center_list]) for name in center_list[0].coordinates}
+        directions = [self.tangent(p)[: self.columns] for p in center_list] if tangent is None else [tangent]
+        direction_lanes = lanes(directions), padded(steps, LANES)
+        arrays = coordinates, lanes([p.value for p in center_list]), *direction_lanes, np.asarray(corrected)
         scaled: Any = rows.astype(np.int32), np.asarray(self.value_scale)
-        solved = curve_points(self.model.system, *given, *scaled, pose_type=self.model.pose_type, driven=self.driven)
+        solved = curve_points(self.model.system, *arrays, *scaled, pose_type=self.model.pose_type, driven=self.driven)
         cut = {name: np.asarray(x)[..., :count] for name, x in solved.coordinates.items()}
         others = [np.asarray(x)[..., :count] for x in solved[1:]]
         return CurvePoints(cut, *others)
@@ -273,8 +273,8 @@ class PathTracker:
     def signs(self, points: CurvePoints, rows: np.ndarray) -> Float[np.ndarray, " lane"]:
         """Return the signs of the determinants of the bordered Jacobians of points."""
         rates = np.moveaxis(self.rates(points.coordinates, points.value), -1, 0)
-        whole = self.bordered(np.moveaxis(points.jacobian, -1, 0), rates, rows)
-        return np.linalg.slogdet(np.where(np.isfinite(whole), whole, 0.0))[0]
+        matrices = self.bordered(np.moveaxis(points.jacobian, -1, 0), rates, rows)
+        return np.linalg.slogdet(np.where(np.isfinite(matrices), matrices, 0.0))[0]
 
     def singularity_distance(self, point: CurvePoint) -> complex:
         """Return the arc length to the nearest point with a singular bordered Jacobian; it may be complex.
@@ -322,13 +322,13 @@ class PathTracker:
         """Return half the second derivatives of the residual along directions."""
         coordinates = {name: c[0][..., None] for name, c in point.coordinates.items()}
         scale, value = np.asarray(self.value_scale if self.driven else 0.0), np.asarray(point.value[0])
-        wide = np.pad(directions, ((0, self.columns + 1 - self.unknowns), (0, 0)))
+        padded_directions = np.pad(directions, ((0, self.columns + 1 - self.unknowns), (0, 0)))
 
-        def of_some(lanes: Int[np.ndarray, " lane"]) -> Any:
-            given = self.model.system, coordinates, value, wide[:, lanes], scale
-            return second_order(*given, pose_type=self.model.pose_type)
+        def of_lanes(lanes: Int[np.ndarray, " lane"]) -> Any:
+            arguments = self.model.system, coordinates, value, padded_directions[:, lanes], scale
+            return second_order(*arguments, pose_type=self.model.pose_type)
 
-        return in_chunks(of_some, wide.shape[1], (LANES,), threads=1)
+        return in_chunks(of_lanes, padded_directions.shape[1], (LANES,), threads=1)
 
 
 def _rank(sizes: Float[np.ndarray, " k"], tolerance: float) -> int:

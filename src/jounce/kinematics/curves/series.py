@@ -77,8 +77,8 @@ class _Curve:
         entries = self.system.jacobian(pose, Jet([value[None]]))
         if not self.driven:
             return entries
-        still = pose.extended(None, None)
-        rate = self.system.residual(still, Jet([value[None], jnp.ones_like(value)[None]])).dense().coefficients[1]
+        extended = pose.extended(None, None)
+        rate = self.system.residual(extended, Jet([value[None], jnp.ones_like(value)[None]])).dense().coefficients[1]
         return jnp.concatenate([entries, (rate * self.value_scale)[:, None]], axis=1)
 
     def bordered(self, jacobian: Any, tangent: Any) -> Any:
@@ -130,16 +130,16 @@ def curve_points(
     curve = _Curve(system, rows, value_scale, driven)
     series = {name: Jet(tuple(c)) for name, c in coordinates.items()}
     pose = pose_type.predicted_from(series, step)
-    reached = Jet(tuple(value)).evaluate(step)
-    pose, reached, (first, last) = _corrected(curve, pose, reached, tangent, corrected)
-    jacobian = curve.jacobian(pose, reached)
+    end_value = Jet(tuple(value)).evaluate(step)
+    pose, end_value, (first, last) = _corrected(curve, pose, end_value, tangent, corrected)
+    jacobian = curve.jacobian(pose, end_value)
     factor = curve.bordered(jacobian, tangent)
     value_rate = Jet(tuple(value)).differentiate().evaluate(step)
-    solved, value = _differentiated(curve, pose, reached, factor, len(value) - 1)
+    solved, value = _differentiated(curve, pose, end_value, factor, len(value) - 1)
     rates = {name: jet.differentiate().evaluate(step) for name, jet in series.items()}
-    slope = _slope(curve, pose, reached, rates, value_rate)
-    residual = jnp.max(jnp.abs(curve.residual(pose.truncate(0), reached)), axis=0, initial=0.0)
-    admissible = jnp.all(system.admissible(Jet([reached[None]])), axis=0)
+    slope = _slope(curve, pose, end_value, rates, value_rate)
+    residual = jnp.max(jnp.abs(curve.residual(pose.truncate(0), end_value)), axis=0, initial=0.0)
+    admissible = jnp.all(system.admissible(Jet([end_value[None]])), axis=0)
     return CurvePoints(solved, value, jacobian, slope, first, last, residual, admissible)
 
 
@@ -149,19 +149,19 @@ def _corrected(curve: _Curve, pose: Any, value: Any, tangent: Any, corrected: An
 
     def unfinished(state: Any) -> Any:
         _, _, (_, last), before, count = state
-        done = (last <= ROUNDING) | (before <= QUADRATIC)
-        return corrected & jnp.any(~done & (jnp.isfinite(last) | (count == 0))) & (count < MAX_CORRECTIONS)
+        converged = (last <= ROUNDING) | (before <= QUADRATIC)
+        return corrected & jnp.any(~converged & (jnp.isfinite(last) | (count == 0))) & (count < MAX_CORRECTIONS)
 
     def iterate(state: Any) -> Any:
         pose, value, (first, last), _, count = state
-        right = jnp.concatenate([-curve.residual(pose, value)[curve.rows], none])
-        step = curve.bordered(curve.jacobian(pose, value), tangent).solve(right, refined=False)
+        rhs = jnp.concatenate([-curve.residual(pose, value)[curve.rows], none])
+        step = curve.bordered(curve.jacobian(pose, value), tangent).solve(rhs, refined=False)
         size = jnp.max(jnp.abs(step), axis=0)
         pose, value = curve.moved(pose, value, step)
         return pose, value, (jnp.where(count == 0, size, first), size), last, count + 1
 
-    unknown = np.full(value.shape[0], np.inf)
-    pose, value, sizes, *_ = jax.lax.while_loop(unfinished, iterate, (pose, value, (unknown, unknown), unknown, 0))
+    infinite = np.full(value.shape[0], np.inf)
+    pose, value, sizes, *_ = jax.lax.while_loop(unfinished, iterate, (pose, value, (infinite, infinite), infinite, 0))
     return pose, value, sizes
 
 
@@ -195,19 +195,19 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
         history, series, turns, rates = carry
         trial = None if planar else _known_spin(series[1], turns, k)
         residual, newest = recursion.advanced(history, k, (None, trial, None))
-        right = jnp.concatenate([-residual[curve.rows], jnp.zeros((1, lanes))])
-        solution = factor.solve(right)
+        rhs = jnp.concatenate([-residual[curve.rows], jnp.zeros((1, lanes))])
+        solution = factor.solve(rhs)
         # x'[j] = (j + 1) x[j + 1], and the coefficient of order k - 1 of x'.x' vanishes
-        known = jnp.sum(_convolved(rates, rates, k - 1, lambda a, b: jnp.sum(a * b, axis=1)), axis=0)
-        deficit = -known / (2 * k) - jnp.sum(tangent * solution[:count], axis=0)
+        products = jnp.sum(_convolved(rates, rates, k - 1, lambda a, b: jnp.sum(a * b, axis=1)), axis=0)
+        deficit = -products / (2 * k) - jnp.sum(tangent * solution[:count], axis=0)
         solution = solution + null * deficit[None]
         shift, turn, rate = parts(solution)
         change = spun(turn)
         history = recursion.noted(history, k, recursion.corrected(newest, (shift, change, rate)))
-        now = shift, change if trial is None else trial + change, rate
-        put = jax.lax.dynamic_update_index_in_dim
-        series = tuple(put(x, y, k, 0) for x, y in zip(series, now, strict=True))
-        return history, series, put(turns, k * turn, k - 1, 0), put(rates, k * solution[:count], k - 1, 0)
+        newest_terms = shift, change if trial is None else trial + change, rate
+        update = jax.lax.dynamic_update_index_in_dim
+        series = tuple(update(x, y, k, 0) for x, y in zip(series, newest_terms, strict=True))
+        return history, series, update(turns, k * turn, k - 1, 0), update(rates, k * solution[:count], k - 1, 0)
 
     _, series, _, _ = jax.lax.fori_loop(2, order + 1, level, (history, series, turns, rates))
     name = "angle" if planar else "quaternion"
@@ -229,11 +229,11 @@ def _convolved(left: Any, right: Any, order: Any, product: Any) -> Any:
 
 def _slope(curve: _Curve, pose: Any, value: Any, rates: dict[str, Any], value_rate: Any) -> Any:
     """Return the derivative of the Jacobian along the series, which is smooth even where branches cross."""
-    now = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
+    coordinates = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
 
     def at(step: Any) -> Any:
-        moved = {name: x + step * rates[name] for name, x in now.items()}
-        return curve.jacobian(pose_at(moved, type(pose)), value + step * value_rate)
+        displaced = {name: x + step * rates[name] for name, x in coordinates.items()}
+        return curve.jacobian(pose_at(displaced, type(pose)), value + step * value_rate)
 
     return jax.jvp(at, (np.zeros(()),), (np.ones(()),))[1]
 
@@ -253,8 +253,8 @@ def second_order(
     The coordinates have the shape (..., bodies, 1).
     """
     lanes = directions.shape[1]
-    wide = {name: jnp.broadcast_to(x, (*x.shape[:-1], lanes)) for name, x in coordinates.items()}
-    pose = pose_at(wide, pose_type)
+    repeated = {name: jnp.broadcast_to(x, (*x.shape[:-1], lanes)) for name, x in coordinates.items()}
+    pose = pose_at(repeated, pose_type)
     pose = pose.extended(*system.coordinates(directions[: system.shape[1]], pose.shifts)).extended(None, None)
     rate = value_scale * directions[-1:]
     time = Jet([jnp.full((1, lanes), value), rate, jnp.zeros((1, lanes))])

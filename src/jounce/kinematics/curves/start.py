@@ -158,11 +158,11 @@ def _check_freedom(tracker: PathTracker, point: CurvePoint) -> None:
     )
 
 
-def check_number(name: str, value: Any, least: Any, most: Any) -> None:
+def check_number(name: str, value: Any, lowest: Any, highest: Any) -> None:
     """Raise MechanismError unless an option is a finite number within bounds."""
     fits = isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(float(value))
-    if not fits or not least <= value <= most:
-        bounds = "" if not math.isfinite(most) else f" from {least:g} to {most:g}"
+    if not fits or not lowest <= value <= highest:
+        bounds = "" if not math.isfinite(highest) else f" from {lowest:g} to {highest:g}"
         raise MechanismError(f"must be a finite number{bounds}", name=name, value=value)
 
 

@@ -51,8 +51,8 @@ def assemble_side_by_side(
         return jnp.any(jnp.max(jnp.abs(gaps), axis=0) > CLOSED) & (count < STEPS)
 
     def iterate(state: Any) -> Any:
-        now, gaps, damping, count = state
-        pose = pose_at(now, pose_type)
+        current, gaps, damping, count = state
+        pose = pose_at(current, pose_type)
         jacobian = system.jacobian(pose, time)
         normal = jnp.sum(jacobian[:, :, None] * jacobian[:, None], axis=0)
         normal = normal + jnp.eye(columns)[..., None] * damping[None, None]
@@ -60,14 +60,14 @@ def assemble_side_by_side(
         step = -DenseFactor.of(normal).solve(gradient, refined=False)
         size = jnp.max(jnp.abs(step), axis=0, keepdims=True)
         step = step * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(size, 1e-300))
-        moved = pose.displaced(*system.coordinates(step, pose.shifts))
-        trial_coordinates = {name: jet.coefficients[0] for name, jet in moved.coordinates().items()}
-        trial = residual(moved)
+        displaced = pose.displaced(*system.coordinates(step, pose.shifts))
+        trial_coordinates = {name: jet.coefficients[0] for name, jet in displaced.coordinates().items()}
+        trial = residual(displaced)
         better = jnp.sum(trial**2, axis=0) < jnp.sum(gaps**2, axis=0)
-        now = {name: jnp.where(better, trial_coordinates[name], x) for name, x in now.items()}
+        current = {name: jnp.where(better, trial_coordinates[name], x) for name, x in current.items()}
         eased = jnp.maximum(damping * EASED, SMALLEST_DAMPING)
         damping = jnp.where(better, eased, jnp.minimum(damping * STIFFENED, LARGEST_DAMPING))
-        return now, jnp.where(better[None], trial, gaps), damping, count + 1
+        return current, jnp.where(better[None], trial, gaps), damping, count + 1
 
     gaps = residual(pose_at(coordinates, pose_type))
     start = (coordinates, gaps, np.full(lanes, FIRST_DAMPING), 0)

@@ -59,40 +59,40 @@ def _assembled(
         return jnp.any(state[1]) & (state[2] < MAX_STEPS)
 
     def correct(state: Any) -> Any:
-        coordinates, moving, count = state
+        coordinates, active, count = state
         pose = pose_at(coordinates, pose_type)
         scale = system.pattern.row_scale(unscaled.entries(pose, time))
         step = factored(system, pose, time).solve(-system.residual(pose, time).coefficients[0])
         size = jnp.max(jnp.abs(step), axis=0)
-        step, now = step * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(size, 1e-300))[None], gaps(pose, scale)
+        step, gap = step * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(size, 1e-300))[None], gaps(pose, scale)
 
-        def displaced(part: Any) -> Any:
-            return pose.displaced(*system.coordinates(step * part[None], pose.shifts))
+        def displaced(fraction: Any) -> Any:
+            return pose.displaced(*system.coordinates(step * fraction[None], pose.shifts))
 
-        def better(part: Any) -> Any:
-            return (gaps(displaced(part), scale) < now) | (size <= tolerance)
+        def better(fraction: Any) -> Any:
+            return (gaps(displaced(fraction), scale) < gap) | (size <= tolerance)
 
         def halve(state: Any) -> Any:
-            part, good, tried = state
-            part = jnp.where(good, part, 0.5 * part)
-            return part, good | better(part), tried + 1
+            fraction, accepted, tried = state
+            fraction = jnp.where(accepted, fraction, 0.5 * fraction)
+            return fraction, accepted | better(fraction), tried + 1
 
-        whole = jnp.ones_like(size)
-        part, good, _ = jax.lax.while_loop(
-            lambda s: jnp.any(moving & ~s[1]) & (s[2] < HALVINGS), halve, (whole, better(whole), jnp.zeros((), int))
+        ones = jnp.ones_like(size)
+        fraction, accepted, _ = jax.lax.while_loop(
+            lambda s: jnp.any(active & ~s[1]) & (s[2] < HALVINGS), halve, (ones, better(ones), jnp.zeros((), int))
         )
-        trial = {name: jet.coefficients[0] for name, jet in displaced(part).coordinates().items()}
-        take = moving & good
+        trial = {name: jet.coefficients[0] for name, jet in displaced(fraction).coordinates().items()}
+        take = active & accepted
         coordinates = {name: jnp.where(_per_lane(take, x), trial[name], x) for name, x in coordinates.items()}
         return coordinates, take & (size > tolerance), count + 1
 
     lag = jnp.where(driven, jnp.abs(unscaled.residual(pose_at(guess, pose_type), time).coefficients[0]), 0.0)
     start = (guess, jnp.isfinite(instant), jnp.zeros((), int))
-    coordinates, moving, _ = jax.lax.while_loop(going, correct, start)
+    coordinates, active, _ = jax.lax.while_loop(going, correct, start)
     pose = pose_at(coordinates, pose_type)
     scale = system.pattern.row_scale(unscaled.entries(pose, time))
     open_by = jnp.max(jnp.abs(scale * unscaled.residual(pose, time).coefficients[0]), axis=0)
-    plain = ~moving & (open_by <= jnp.maximum(1e3 * tolerance, 1e-9)) & (jnp.max(lag, axis=0) < np.pi)
+    plain = ~active & (open_by <= jnp.maximum(1e3 * tolerance, 1e-9)) & (jnp.max(lag, axis=0) < np.pi)
     plain &= factored(system, pose, time).pivot_ratio() > CLEARLY_REGULAR
     if "angle" in coordinates:
         plain &= jnp.max(jnp.abs(coordinates["angle"] - guess["angle"]), axis=0) < np.pi
@@ -100,8 +100,8 @@ def _assembled(
 
 
 def _of_many(shared: Any, designs: Any, *, pose_type: type[Pose]) -> AssemblyAttempts:
-    (system, tolerance, driven), (guess, instant, own) = shared, designs
-    return _assembled(of_design(system, own), guess, instant, tolerance, driven, pose_type)
+    (system, tolerance, driven), (guess, instant, design) = shared, designs
+    return _assembled(of_design(system, design), guess, instant, tolerance, driven, pose_type)
 
 
 @mapped(by_xla=_of_many, made_of=(_assembled,))
@@ -118,8 +118,8 @@ def assemble_from_guess(shared: Any, designs: Any, *, pose_type: type[Pose]) -> 
     pose_type : type
         PlanarPose or SpatialPose.
     """
-    (system, tolerance, driven), (guess, instant, own) = shared, designs
-    system = with_fields(of_design(system, own), reflected=True)
+    (system, tolerance, driven), (guess, instant, design) = shared, designs
+    system = with_fields(of_design(system, design), reflected=True)
     return _assembled(system, guess, instant, tolerance, driven, pose_type)
 
 

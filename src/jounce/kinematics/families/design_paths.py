@@ -80,9 +80,9 @@ class Anchors(NamedTuple):
         """Yield the anchors in parts of `size` designs."""
         for k in range(0, len(self.designs), size):
             begins = self.begins[k : k + size + 1]
-            some = slice(begins[0], begins[-1])
-            those = self.instant[some], self.order[some], self.states
-            yield Anchors(self.designs[k : k + size], begins - begins[0], *those)
+            window = slice(begins[0], begins[-1])
+            fields = self.instant[window], self.order[window], self.states
+            yield Anchors(self.designs[k : k + size], begins - begins[0], *fields)
 
 
 class DesignPaths:
@@ -131,7 +131,7 @@ class DesignPaths:
         steps: list[tuple[Indices, Lanes, SolvedState]] = []  # designs, instants and states of the anchors
         limits = StepLimits(np.asarray(last), np.asarray(SMALLEST_STEP * (last - first)))
         source = solver.needed(solver.still({name: x[..., lanes] for name, x in coordinates.items()}))
-        own = self.systems.own(lanes)
+        values = self.systems.own(lanes)
         start = np.full(len(lanes), first)
         control = initial_control(
             ExpansionPoint(start, *[np.full(len(lanes), x) for x in (np.inf, np.inf, 0.0)]), start
@@ -143,21 +143,21 @@ class DesignPaths:
             if not lanes.size:
                 break
             step = control.target - control.expansion_point.instant
-            arrival = solver.program((source, step, control.target, own, np.ones(len(lanes), bool)))
+            arrival = solver.program((source, step, control.target, values, np.ones(len(lanes), bool)))
             self._arrival = arrival
             end_point: Any = ExpansionPoint(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
-            begins: Any = control.step == 0
+            is_start: Any = control.step == 0
             control, taken = decide((control, arrival.status, end_point))
-            unlike = taken & ((arrival.status != Status.OK) | is_next_to_singular(end_point, begins))
+            unsuitable = taken & ((arrival.status != Status.OK) | is_next_to_singular(end_point, is_start))
             ended = control.ending != StopReason.UNFINISHED
-            self.individual[lanes[unlike | ended & (control.ending != StopReason.ARRIVED)]] = True
-            reached = solver.needed(arrival.state(slice(None) if taken.all() else taken))
-            steps.append((lanes[taken], end_point.instant[taken], reached))
-            source = reached if taken.all() else _replaced(source, taken, reached)
-            if (left := ~(ended | unlike)).all():
+            self.individual[lanes[unsuitable | ended & (control.ending != StopReason.ARRIVED)]] = True
+            new_source = solver.needed(arrival.state(slice(None) if taken.all() else taken))
+            steps.append((lanes[taken], end_point.instant[taken], new_source))
+            source = new_source if taken.all() else _replaced(source, taken, new_source)
+            if (remaining := ~(ended | unsuitable)).all():
                 continue
-            lanes = lanes[left]
-            control, source, own = at_lanes((control, source, own), left)
+            lanes = lanes[remaining]
+            control, source, values = at_lanes((control, source, values), remaining)
         self.individual[lanes] = True
         return self._sorted(steps)
 
@@ -183,29 +183,29 @@ class DesignPaths:
         if not designs.size:
             return [], status
         levels, width = self.solver.finite_order + 1, self.solver.program.width
-        least = max(1, self.solver.longest_stride * width // times)
-        size = min(max(least, min(len(designs) // MOST_BLOCKS, LARGEST_BLOCK * least)), len(designs))
+        fewest = max(1, self.solver.longest_stride * width // times)
+        size = min(max(fewest, min(len(designs) // MOST_BLOCKS, LARGEST_BLOCK * fewest)), len(designs))
         size -= size % width if size > width else 0
         blocks = [block for group in self._groups for block in group.parts(size)]
-        most, like = max(len(block.instant) for block in blocks), self._arrival.state(slice(1))
-        wholes = [np.empty((levels, *x.shape[1:-1], count, times)) for x in like[1]]
+        anchor_count, like = max(len(block.instant) for block in blocks), self._arrival.state(slice(1))
+        results = [np.empty((levels, *x.shape[1:-1], count, times)) for x in like[1]]
 
         def new() -> SolveBuffer:
-            return SolveBuffer(self.solver, like, size * times, most)
+            return SolveBuffer(self.solver, like, size * times, anchor_count)
 
         def put(block: Anchors, state: tuple[Any, tuple[np.ndarray, ...], Any], outcome: Indices) -> None:
             lanes = _slice_of(block.designs)
             status[lanes] = self._as_given(outcome.reshape(-1, times), block.designs)
-            for whole, part in zip(wholes, state[1], strict=True):
+            for result, part in zip(results, state[1], strict=True):
                 with np.errstate(over="ignore"):  # of failed instants
                     derivatives = plain_derivatives(part[:levels], out=part[:levels])
                 values = derivatives.reshape(*derivatives.shape[:-1], -1, times)
-                whole[..., lanes, :] = self._as_given(values, block.designs)
+                result[..., lanes, :] = self._as_given(values, block.designs)
 
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
             for _ in solve_in_buffers(new, blocks, self._load, put, pool.map):
                 pass
-        outputs = [[np.transpose(x, (2, 3, 0, 1)) for x in np.moveaxis(whole, 2, 0)] for whole in wholes]
+        outputs = [[np.transpose(x, (2, 3, 0, 1)) for x in np.moveaxis(result, 2, 0)] for result in results]
         for group in self._groups:
             if group.designs.size:
                 self._count_turns(outputs, group)
@@ -230,8 +230,8 @@ class DesignPaths:
         to_one_before = np.empty(instants.shape)
         np.subtract(instants[:, 1:], instants[:, :-1], out=to_one_before[:, 1:])
         to_one_before[:, _begins(times, length)] = np.inf
-        near = to_one_before <= np.abs(to_anchor)
-        source, step = np.where(near, -1, nearest), np.where(near, to_one_before, to_anchor)
+        is_near = to_one_before <= np.abs(to_anchor)
+        source, step = np.where(is_near, -1, nearest), np.where(is_near, to_one_before, to_anchor)
         rounds = _rounds(count, times, length, buffer.width)
         buffer.load(instants.ravel(), (source.ravel(), step.ravel()), rounds, self.systems.own(block.designs))
         return count * times
@@ -240,28 +240,28 @@ class DesignPaths:
         """Add to angles about axes the turns made along the anchors of their designs."""
         if not any(map(measures_angle, self.solver.model.system.outputs)):
             return
-        designs, owner, at = anchors.designs, anchors.owner, anchors.instant
+        designs, owner, times = anchors.designs, anchors.owner, anchors.instant
         system = self.systems.at(designs[owner])
         measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
         series = np.nan_to_num(anchors.states[0]["quaternion"][..., anchors.order], nan=0.0, posinf=0.0, neginf=0.0)
         index = np.arange(len(owner))
-        following = np.where(np.append(owner[1:] != owner[:-1], True), index, index + 1)  # the last anchor: itself
+        next_anchor = np.where(np.append(owner[1:] != owner[:-1], True), index, index + 1)  # the last anchor: itself
 
-        def instants(anchor: Indices, share: Lanes) -> Lanes:
-            return at[anchor] + share * (at[following[anchor]] - at[anchor])
+        def instants(anchor: Indices, fraction: Lanes) -> Lanes:
+            return times[anchor] + fraction * (times[next_anchor[anchor]] - times[anchor])
 
         for counted, output in measuring:
 
-            def measured(anchor: Indices, share: Lanes, group: Any = counted) -> Float[np.ndarray, "angle lane"]:
-                ends = anchor, following[anchor]
-                attitudes = blended_attitudes(at, series, ends, instants(anchor, share))
-                own = jax.tree.map(lambda leaf: leaf if np.shape(leaf)[-1] == 1 else leaf[..., anchor], group)
-                return raw_angles([own], {"quaternion": attitudes})[0]
+            def measured(anchor: Indices, fraction: Lanes, group: Any = counted) -> Float[np.ndarray, "angle lane"]:
+                ends = anchor, next_anchor[anchor]
+                attitudes = blended_attitudes(times, series, ends, instants(anchor, fraction))
+                anchor_group = jax.tree.map(lambda leaf: leaf if np.shape(leaf)[-1] == 1 else leaf[..., anchor], group)
+                return raw_angles([anchor_group], {"quaternion": attitudes})[0]
 
             first_angles = np.broadcast_to(counted.element.datum.near, (counted.instances, len(owner)))
             samples = counted_along(measured, owner, first_angles, SAMPLES_A_STEP)
-            known = owner[samples.path], instants(samples.path, samples.share)
-            nearest = _nearest(*known, self._instants[designs], self._ends)
+            sample_points = owner[samples.path], instants(samples.path, samples.share)
+            nearest = _nearest(*sample_points, self._instants[designs], self._ends)
             for values, angle in zip(output, samples.angle, strict=True):
                 expected = self._as_given(angle[nearest], designs)
                 values[designs, :, 0, 0] = shifted_by_turns(values[designs, :, 0, 0], expected)
@@ -273,9 +273,9 @@ def _rounds(count: int, times: int, length: int, width: int) -> Int[np.ndarray, 
 
     Each lane solves a piece of a motion with `length` instants, one after another. Spare lanes repeat the last piece.
     """
-    first = (np.arange(count)[:, None] * times + _begins(times, length)).ravel()
-    first = first[np.minimum(np.arange(-(-len(first) // width) * width), len(first) - 1)]
-    pieces = first[:, None] + np.arange(length)
+    starts = (np.arange(count)[:, None] * times + _begins(times, length)).ravel()
+    starts = starts[np.minimum(np.arange(-(-len(starts) // width) * width), len(starts) - 1)]
+    pieces = starts[:, None] + np.arange(length)
     return np.ascontiguousarray(pieces.reshape(-1, width, length).swapaxes(1, 2).reshape(-1, width))
 
 
@@ -286,7 +286,7 @@ def _begins(times: int, length: int) -> Indices:
 
 def _nearest(
     owner: Int[np.ndarray, " anchor"],
-    at: Float[np.ndarray, " anchor"],
+    anchors: Float[np.ndarray, " anchor"],
     instants: Float[np.ndarray, "design time"],
     ends: tuple[float, float],
 ) -> Int[np.ndarray, "design time"]:
@@ -297,10 +297,10 @@ def _nearest(
     (first, last), times = ends, instants.shape[1]
     scale = 0.5 / max(last - first, 1e-300)
     encoded = np.arange(len(instants))[:, None] + scale * (instants - first)
-    middle = owner[:-1] + scale * (0.5 * (at[:-1] + at[1:]) - first)
-    until = np.searchsorted(encoded.ravel(), middle, side="right")
-    until = np.where(owner[1:] == owner[:-1], until, owner[1:] * times)
-    return np.repeat(np.arange(len(at)), np.diff(until, prepend=0, append=instants.size)).reshape(instants.shape)
+    middle = owner[:-1] + scale * (0.5 * (anchors[:-1] + anchors[1:]) - first)
+    changes = np.searchsorted(encoded.ravel(), middle, side="right")
+    changes = np.where(owner[1:] == owner[:-1], changes, owner[1:] * times)
+    return np.repeat(np.arange(len(anchors)), np.diff(changes, prepend=0, append=instants.size)).reshape(instants.shape)
 
 
 def _slice_of(designs: Indices) -> slice | Indices:
@@ -312,9 +312,9 @@ def _slice_of(designs: Indices) -> slice | Indices:
 def _replaced(state: Any, lanes: Any, new: Any) -> Any:
     """Return a state with some lanes replaced."""
 
-    def replaced(whole: np.ndarray, part: np.ndarray) -> np.ndarray:
-        whole = whole.copy()
-        whole[..., lanes] = part
-        return whole
+    def replaced(values: np.ndarray, part: np.ndarray) -> np.ndarray:
+        values = values.copy()
+        values[..., lanes] = part
+        return values
 
     return jax.tree.map(replaced, state, new)

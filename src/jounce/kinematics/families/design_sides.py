@@ -29,8 +29,8 @@ class Sides:
 
     def like(self, values: Mapping[str, np.ndarray]) -> "Sides":
         """Return the sides with the component axes of other values of the same outputs."""
-        named = {name: array.reshape(*array.shape[:3], *values[name].shape[3:]) for name, array in self.values.items()}
-        return dataclasses.replace(self, values=named)
+        arrays = {name: array.reshape(*array.shape[:3], *values[name].shape[3:]) for name, array in self.values.items()}
+        return dataclasses.replace(self, values=arrays)
 
 
 @under_own_settings
@@ -49,20 +49,20 @@ def sides_of_designs(
     `breaks_of_laws`.
     """
     count = len(next(iter(parameters.values())))
-    different = 0
+    distinct_count = 0
     if laws_may_break(mechanism, forces=forces):
-        different = count if breaks_depend_on(mechanism, parameters) else 1
+        distinct_count = count if breaks_depend_on(mechanism, parameters) else 1
     sides = []
-    for k in range(different):
+    for k in range(distinct_count):
         try:
             design = mechanism.with_parameters(**{name: float(values[k]) for name, values in parameters.items()})
             breaks = breaks_of_laws(design, first, last, order, forces=forces)
         except JounceError:  # raised again when the design is solved
             breaks = np.zeros(0)
-        instants, which = both_sides(breaks, first, last)
-        sides.append((breaks[which], instants))
-    most = max((len(instants) for _, instants in sides), default=0)
-    both = np.full((2, count, most), first)
-    for k, pair in enumerate(sides * (count // max(different, 1))):
-        both[:, k, : len(pair[0])] = pair
-    return both[0], both[1]
+        instants, indices = both_sides(breaks, first, last)
+        sides.append((breaks[indices], instants))
+    width = max((len(instants) for _, instants in sides), default=0)
+    pairs = np.full((2, count, width), first)
+    for k, pair in enumerate(sides * (count // max(distinct_count, 1))):
+        pairs[:, k, : len(pair[0])] = pair
+    return pairs[0], pairs[1]

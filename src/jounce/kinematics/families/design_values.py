@@ -60,8 +60,8 @@ def assembled_designs(
     guess = {name: np.asarray(x)[..., 0, :] for name, x in jax.vmap(guessed, out_axes=-1)(rows).items()}
     driven = np.array([[name.startswith("drivers.")] for name in model.rows])
     designs = guess, np.full(len(rows), instant), systems.own(slice(None))
-    shared, one = (model.system, np.asarray(tolerance), driven), jax.tree.map(lambda x: x[..., :1], designs)
-    attempts = assemble_from_guess.program(shared, one, pose_type=model.pose_type)(designs)
+    shared, first_design = (model.system, np.asarray(tolerance), driven), jax.tree.map(lambda x: x[..., :1], designs)
+    attempts = assemble_from_guess.program(shared, first_design, pose_type=model.pose_type)(designs)
     return systems, attempts._replace(plain=np.asarray(attempts.plain) & ~_unfit(systems, len(rows)))
 
 
@@ -82,7 +82,7 @@ def _with_values_of(model: Model, common: Model) -> System:
 
 def _unfit(systems: VariedTree, count: int) -> Bool[np.ndarray, " design"]:
     """Return which designs have an invalid value; solved individually, they raise an error in words."""
-    bad, system = np.zeros(count, bool), systems.at(slice(None))
+    invalid, system = np.zeros(count, bool), systems.at(slice(None))
     for group in (*system.groups, *system.outputs):
         signs = facts_of(type(group.element)).signs
         for name, kind in field_kinds(type(group.element)).items():
@@ -93,5 +93,5 @@ def _unfit(systems: VariedTree, count: int) -> Bool[np.ndarray, " design"]:
             entries = entries if kind == "vector" else entries.reshape(-1, *entries.shape[-2:])
             entries = np.broadcast_to(entries, (*np.shape(entries)[:-1], count))
             unfit = has_other_sign(signs[name], entries.min(axis=0), np.abs(entries).max(axis=0))  # see `check_value`
-            bad |= (unfit | ~np.isfinite(entries).all(axis=0)).any(axis=0)
-    return bad
+            invalid |= (unfit | ~np.isfinite(entries).all(axis=0)).any(axis=0)
+    return invalid

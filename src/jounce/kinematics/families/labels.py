@@ -61,11 +61,11 @@ def labeled_family(
             coordinates |= axes
             dims += axes
         variables[name] = (dims, series, {"units": output.unit, "long_name": derivatives_of(name)})
-    meanings = " ".join(each.name.lower() for each in Status)
-    words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": meanings}
-    variables["status"] = ((lane, "time"), status, words)
-    taken = {*variables, *coordinates}
-    named = {name: name if name not in taken else f"parameter_{name}" for name in values}
-    coordinates |= {named[name]: (lane, value, {"long_name": name}) for name, value in values.items()}
+    meanings = " ".join(member.name.lower() for member in Status)
+    status_attributes = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": meanings}
+    variables["status"] = ((lane, "time"), status, status_attributes)
+    used_names = {*variables, *coordinates}
+    coordinate_names = {name: name if name not in used_names else f"parameter_{name}" for name in values}
+    coordinates |= {coordinate_names[name]: (lane, value, {"long_name": name}) for name, value in values.items()}
     attributes = {"title": title or f"{lane}s of a mechanism", "source": "jounce", "backend": backend}
     return xarray.Dataset(variables, coordinates, attributes)

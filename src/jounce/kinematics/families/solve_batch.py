@@ -165,8 +165,8 @@ class _Family:
         self.names, self.rows = tuple(self.parameters), np.stack(list(self.parameters.values()), axis=-1)
         self.order, self.tolerance = checked_settings(mechanism, order, tolerance), float(tolerance)
         self.instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
-        some = [self._design(k, mechanism) for k in (0, len(self.rows) // 2, -1)]
-        self.mechanism = with_idle_held_in_family(mechanism, some, self.instants, tolerance, solve)
+        samples = [self._design(k, mechanism) for k in (0, len(self.rows) // 2, -1)]
+        self.mechanism = with_idle_held_in_family(mechanism, samples, self.instants, tolerance, solve)
         self.held = with_output_drivers(self.mechanism)  # the mechanism solved side by side
         self.progress = progress
         self.outputs: dict[str, np.ndarray] = {}
@@ -203,13 +203,13 @@ class _Family:
         count = len(self.rows)
         all_individually = self.mechanism.assembly is not None or self._of_whole_motions() or self._pieces_vary()
         all_individually = all_individually or has_ends(self.mechanism)  # ends are found in whole motions
-        left = np.arange(count) if all_individually else self._side_by_side(threads)
+        remaining = np.arange(count) if all_individually else self._side_by_side(threads)
         if not (individually or all_individually):
             return
-        for done, k in enumerate(left.tolist()):
+        for done, k in enumerate(remaining.tolist()):
             self._solve_individually(k)
             if self.progress is not None:
-                self.progress(count - len(left) + done + 1, count)
+                self.progress(count - len(remaining) + done + 1, count)
 
     @property
     def dataset(self) -> Any:
@@ -244,28 +244,28 @@ class _Family:
         count = len(self.rows)
         first, last = float(self.instants[0]), float(self.instants[-1])
         attempts = ((k, assembled) for k in range(count) if (assembled := self._assembled(k)) is not None)
-        known, (model, _) = next(attempts, (0, (None, None)))
+        index, (model, _) = next(attempts, (0, (None, None)))
         if model is None or model.system.rank is not None:
             return np.arange(count)
-        lost = lost_orders(self.mechanism.outputs.values())
-        check_laws(self._design(known, self.mechanism), np.array([first, last]), self.order + lost, forces=False)
+        extra_order = lost_orders(self.mechanism.outputs.values())
+        check_laws(self._design(index, self.mechanism), np.array([first, last]), self.order + extra_order, forces=False)
         model = without_forces(model)
         systems, coordinates, plain, chosen = self._assembled_designs(model)
-        levels, own = max(self.order + lost, LOWEST_ORDER), systems.own(slice(1))
-        solver = Solver(model, levels, self.tolerance, finite_order=self.order, own=own)
+        levels, values_of_first = max(self.order + extra_order, LOWEST_ORDER), systems.own(slice(1))
+        solver = Solver(model, levels, self.tolerance, finite_order=self.order, own=values_of_first)
         paths = DesignPaths(solver, systems, self.all_instants[chosen], last)
         paths.follow(coordinates, plain, threads)
         outputs, status = paths.solved(threads)
         self.backends.add(solver.backend)
-        whole = ~paths.individual
-        self.status[chosen[whole]] = status[whole]
+        complete = ~paths.individual
+        self.status[chosen[complete]] = status[complete]
         names = itertools.chain(*solver.model.outputs)
         for name, values in zip(names, itertools.chain(*outputs), strict=bool(outputs)):
             values[paths.individual] = np.nan
             self._put(name, chosen, values)
         if self.progress is not None:
-            self.progress(int(whole.sum()), count)
-        return np.setdiff1d(np.arange(count), chosen[whole])
+            self.progress(int(complete.sum()), count)
+        return np.setdiff1d(np.arange(count), chosen[complete])
 
     def _assembled_designs(
         self, model: Model
@@ -276,8 +276,8 @@ class _Family:
         """
         system = model.system
         if not any(map(measures_angle, (*system.groups, *system.outputs))) and system.shape[0] == system.shape[1]:
-            given = self.names, self.rows, float(self.instants[0]), self.tolerance
-            systems, attempts = assembled_designs(self.held, model, *given)
+            arguments = self.names, self.rows, float(self.instants[0]), self.tolerance
+            systems, attempts = assembled_designs(self.held, model, *arguments)
             return systems, attempts.coordinates, np.asarray(attempts.plain), np.arange(len(self.rows))
         assembled = {k: attempt for k in range(len(self.rows)) if (attempt := self._assembled(k)) is not None}
         models, positions = zip(*assembled.values(), strict=True)

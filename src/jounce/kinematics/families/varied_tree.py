@@ -47,16 +47,16 @@ class VariedTree:
         """
         flattened: list[Any] = []
 
-        def one(row: Any) -> list[Any]:
+        def leaves_of_row(row: Any) -> list[Any]:
             flattened[:] = jax.tree.flatten(make(row))
             return [leaf for leaf in flattened[0] if isinstance(leaf, Tracer)]
 
-        values = [np.asarray(value)[..., 0, :] for value in jax.vmap(one, out_axes=-1)(rows)]
+        values = [np.asarray(value)[..., 0, :] for value in jax.vmap(leaves_of_row, out_axes=-1)(rows)]
         leaves, structure = flattened
-        which = [k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer)]
+        indices = [k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer)]
         if like is not None:
             leaves, structure = jax.tree.flatten(like)
-        return cls._of(structure, leaves, dict(zip(which, values, strict=True)))
+        return cls._of(structure, leaves, dict(zip(indices, values, strict=True)))
 
     @classmethod
     def joined(cls, trees: Sequence[Any], like: Any = None) -> "VariedTree":
@@ -77,5 +77,5 @@ class VariedTree:
 
     def at(self, lanes: Lanes) -> Any:
         """Return the tree with the leaves of some lanes."""
-        own = self.own(lanes)
-        return jax.tree.unflatten(self.structure, [own.get(k, leaf) for k, leaf in enumerate(self.fixed)])
+        values = self.own(lanes)
+        return jax.tree.unflatten(self.structure, [values.get(k, leaf) for k, leaf in enumerate(self.fixed)])

@@ -110,24 +110,24 @@ def _first_excess(path: FollowedPath, ends: CurveEnds) -> tuple[float, bool] | N
     """Return the first instant beyond an end, s, and whether that end is the upper one."""
     times = np.array([anchor.instant for anchor in path.anchors])
     series = [np.asarray(anchor.state[0]["position"])[:, :, ends.body : ends.body + 1] for anchor in path.anchors]
-    whole = np.concatenate(series, axis=-1)
-    whole = np.where(np.isfinite(whole), whole, 0.0)
-    shared = dataclasses.replace(ends, body=0)
+    coefficients = np.concatenate(series, axis=-1)
+    coefficients = np.where(np.isfinite(coefficients), coefficients, 0.0)
+    single = dataclasses.replace(ends, body=0)
 
     def positions(instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "component 1 time"]:
-        return attitudes_between(times, whole, instants)
+        return attitudes_between(times, coefficients, instants)
 
     samples = within_steps(times, SAMPLES)
-    instants = np.union1d(samples, _peaks(lambda now: shared.excess(positions(now)), samples))
-    beyond = shared.excess(positions(instants)) > 0
-    if not beyond.any():
+    instants = np.union1d(samples, _peaks(lambda t: single.excess(positions(t)), samples))
+    is_beyond = single.excess(positions(instants)) > 0
+    if not is_beyond.any():
         return None
-    first = int(np.argmax(beyond))
+    first = int(np.argmax(is_beyond))
     low, high = float(instants[max(first - 1, 0)]), float(instants[first])
     for _ in range(HALVINGS if first else 0):
         middle = 0.5 * (low + high)
-        out = bool(shared.excess(positions(np.array([middle])))[0] > 0)
-        low, high = (low, middle) if out else (middle, high)
+        is_outside = bool(single.excess(positions(np.array([middle])))[0] > 0)
+        low, high = (low, middle) if is_outside else (middle, high)
     value = float(positions(np.array([high]))[ends.component, 0, 0]) / ends.unit
     return high, value > ends.high
 
@@ -139,9 +139,9 @@ def _peaks(
     values = excess(samples)
     before, middle, after = values[:-2], values[1:-1], values[2:]
     rise = middle - np.minimum(before, after)  # a parabola through three samples rises an eighth of it above the middle
-    near = np.flatnonzero((middle >= before) & (middle >= after) & (middle <= 0) & (middle + rise > 0))
-    low, high = samples[near], samples[near + 2]
-    for _ in range(HALVINGS if near.size else 0):
+    candidates = np.flatnonzero((middle >= before) & (middle >= after) & (middle <= 0) & (middle + rise > 0))
+    low, high = samples[candidates], samples[candidates + 2]
+    for _ in range(HALVINGS if candidates.size else 0):
         third = (high - low) / 3
         rising = excess(low + third) < excess(high - third)
         low, high = np.where(rising, low + third, low), np.where(rising, high, high - third)

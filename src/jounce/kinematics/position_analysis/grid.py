@@ -77,8 +77,8 @@ class GridSolver:
         the reason.
         """
         count = len(self.time)
-        left = self._reached & (self.status != OK)
-        remaining = int(np.count_nonzero(left))
+        unsolved = self._reached & (self.status != OK)
+        remaining = int(np.count_nonzero(unsolved))
         done = count - remaining
 
         def report(solved: int) -> None:
@@ -88,7 +88,7 @@ class GridSolver:
                 progress(done, count)
 
         if remaining or not self._reached.all():
-            self._solve_remaining(left, threads, report)
+            self._solve_remaining(unsolved, threads, report)
         for point in self.path.change_points:
             self._bridge(point)
         self._refuse(self.path.singular_positions_outside())
@@ -97,16 +97,16 @@ class GridSolver:
         if progress is not None and done < count:
             progress(count, count)
 
-    def _solve_remaining(self, left: Bool[np.ndarray, " time"], threads: int, report: Callable[[int], None]) -> None:
-        """Solve the instants marked as left."""
+    def _solve_remaining(self, mask: Bool[np.ndarray, " time"], threads: int, report: Callable[[int], None]) -> None:
+        """Solve the instants marked in a mask."""
         count = len(self.time)
-        stride = stride_of(self.solver, int(np.count_nonzero(left)), count, len(self._anchors))
+        stride = stride_of(self.solver, int(np.count_nonzero(mask)), count, len(self._anchors))
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
             if count > LONG_GRID:
-                left = self._in_blocks(left, stride, pool, report)
-            if left.any() or not self._reached.all():
+                mask = self._in_blocks(mask, stride, pool, report)
+            if mask.any() or not self._reached.all():
                 self._insert_anchors()
-            for lanes in _levels(left, stride):
+            for lanes in _levels(mask, stride):
                 size = self.solver.together if count > LONG_GRID else SMALL_BATCH
                 source = self._sources(lanes, stride)
                 batches = [(lanes[k : k + size], source[k : k + size]) for k in range(0, len(lanes), size)]
@@ -115,13 +115,13 @@ class GridSolver:
                     report(len(batch))
 
     def _in_blocks(
-        self, left: Bool[np.ndarray, " time"], stride: int, pool: Threads, report: Callable[[int], None]
+        self, unsolved: Bool[np.ndarray, " time"], stride: int, pool: Threads, report: Callable[[int], None]
     ) -> Bool[np.ndarray, " time"]:
         """Solve instants in rounds, and return those left: the failures, and the instants that start from them.
 
         Blocks report only that an instant failed; solving these once more finds the cause.
         """
-        count = int(np.count_nonzero(left))  # a long grid is reached up to some instant, and nothing is solved yet
+        count = int(np.count_nonzero(unsolved))  # a long grid is reached up to some instant, and nothing is solved yet
 
         def put(lanes: slice, state: SolvedState, status: Indices) -> None:
             self._store_lanes(lanes, jax.tree.leaves(state))
@@ -130,27 +130,27 @@ class GridSolver:
         blocks = blocks_for(self.solver, 0, count, stride)
         for solved in solve_blocks(self.solver, self.path, self.time, blocks, put, pool.map):
             report(solved)
-        failed = left & (self.status != OK)
+        failed = unsolved & (self.status != OK)
         if failed.any():
-            for lanes in _levels(left, stride):
-                neighbor, known = neighbors(lanes, stride)
-                failed[lanes] |= failed[neighbor] & known
+            for lanes in _levels(unsolved, stride):
+                neighbor, has_neighbor = neighbors(lanes, stride)
+                failed[lanes] |= failed[neighbor] & has_neighbor
         return failed
 
     def _sources(self, lanes: Indices, stride: int) -> Indices:
         """Return the source of each prediction: the neighbor, where it is solved and nearer, or the nearest anchor."""
-        neighbor, known = neighbors(lanes, stride)
-        known &= self.status[neighbor] == OK
+        neighbor, has_neighbor = neighbors(lanes, stride)
+        has_neighbor &= self.status[neighbor] == OK
         time = self.time[lanes]
         nearest = len(self.time) + nearest_instants(self._instants[len(self.time) :], time)
         nearer = np.abs(time - self._instants[neighbor]) <= np.abs(time - self._instants[nearest])
-        return np.where(nearer & known, neighbor, nearest)
+        return np.where(nearer & has_neighbor, neighbor, nearest)
 
     def _solve_batch(self, batch: tuple[Indices, Indices]) -> StepResult:
         """Solve a batch of instants from their sources, and store their states."""
         lanes, source = batch
-        known = jax.tree.map(lambda x: x[..., source], self.solver.needed(self._store))
-        arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+        source_data = jax.tree.map(lambda x: x[..., source], self.solver.needed(self._store))
+        arrival = self.solver(source_data, self.time[lanes] - self._instants[source], self.time[lanes])
         self._store_lanes(lanes, jax.tree.leaves((arrival.coordinates, arrival.outputs, arrival.sign)))
         return arrival
 
@@ -164,14 +164,14 @@ class GridSolver:
 
     def _insert_anchors(self) -> None:
         """Append the anchors behind the instants, and set the states of unreached instants to zero."""
-        count, reached = len(self.time), int(np.count_nonzero(self._reached))
-        for whole, *parts in zip(self._leaves, *(x.leaves for x in self._anchors), strict=True):
-            whole[..., reached:count] = 0
-            whole[..., count:] = np.concatenate(parts, axis=-1)
+        count, reached_count = len(self.time), int(np.count_nonzero(self._reached))
+        for array, *parts in zip(self._leaves, *(x.leaves for x in self._anchors), strict=True):
+            array[..., reached_count:count] = 0
+            array[..., count:] = np.concatenate(parts, axis=-1)
 
     def _store_lanes(self, lanes: slice | Indices, leaves: Sequence[np.ndarray]) -> None:
-        for whole, part in zip(self._leaves, leaves, strict=True):
-            whole[..., lanes] = part
+        for array, part in zip(self._leaves, leaves, strict=True):
+            array[..., lanes] = part
 
     def _rescue(self, lane: int) -> None:
         """Follow the motion to one instant from the anchor before it."""
@@ -188,8 +188,8 @@ class GridSolver:
 
     def _bridge(self, point: ChangePoint) -> None:
         """Replace the instants at and next to a change point by interpolation of the motion on both sides."""
-        near = np.abs(self.time - point.instant) < half_width(point, self.solver.order)
-        lanes = np.flatnonzero(near & (self.time < self.path.ended_at))
+        is_near = np.abs(self.time - point.instant) < half_width(point, self.solver.order)
+        lanes = np.flatnonzero(is_near & (self.time < self.path.ended_at))
         if not lanes.size:
             return
         state = bridged(self.solver, self.path, point, self.time[lanes])
@@ -213,19 +213,19 @@ class GridSolver:
         """Mark instants next to singular positions as SINGULAR, where rounding dominates the results."""
         self.status[spoiled(points, self.time, self.solver.order) & (self.status == OK)] = Status.SINGULAR
 
-    def _explain_end(self, lost: int) -> None:
+    def _explain_end(self, lane: int) -> None:
         """Store, at the first instant that was not reached, why the motion could not be followed there."""
-        path, instant = self.path, self.time[lost : lost + 1]
-        self.status[lost], self.faults[lost] = path.status, path.fault
+        path, instant = self.path, self.time[lane : lane + 1]
+        self.status[lane], self.faults[lane] = path.status, path.fault
         last = path.anchors[-1]
         arrival = self.solver(self.solver.needed(last.state), instant - last.instant, instant)
         if arrival.status[0] == Status.INADMISSIBLE:  # the law is at fault, not the position before
-            self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
+            self.status[lane], self.faults[lane] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
 
 
-def _levels(left: Bool[np.ndarray, " time"], stride: int) -> Iterator[Indices]:
+def _levels(unsolved: Bool[np.ndarray, " time"], stride: int) -> Iterator[Indices]:
     """Yield instants in groups, each after those it starts from; the depth is the number of ones in the index."""
-    lanes = np.flatnonzero(left)
+    lanes = np.flatnonzero(unsolved)
     depth = np.bitwise_count(lanes & (stride - 1))
     for level in np.unique(depth).tolist() if lanes.size else ():
         yield lanes[depth == level]

@@ -46,20 +46,20 @@ class Block(NamedTuple):
         return slice(self.first, self.first + self.count)
 
 
-def stride_of(solver: Solver, left: int, count: int, anchors: int) -> int:
+def stride_of(solver: Solver, unsolved: int, count: int, anchors: int) -> int:
     """Return the distance between instants that start from anchors, a power of two.
 
     Parameters
     ----------
     solver : Solver
         Solver of the instants.
-    left, count : int
+    unsolved, count : int
         Number of instants of a grid still to be solved, and their total.
     anchors : int
         Number of anchors. If few instants are left, all of them start from anchors.
     """
     width, stride = solver.from_anchors if count > LONG_GRID else SMALL_BATCH, 1
-    if left > FEW_BATCHES * width:
+    if unsolved > FEW_BATCHES * width:
         while count // (2 * stride) >= max(2 * anchors, width) and 2 * stride <= solver.longest_stride:
             stride *= 2
     return stride
@@ -98,9 +98,9 @@ def rounds(count: int, stride: int, width: int) -> Int[np.ndarray, "round lane"]
         block = np.array(turns, np.int64)[:, None] * distance + lanes
         starts = np.arange(0, count, members * distance * width)
         result.append((starts[:, None, None] + block).reshape(-1, width))
-    whole = np.concatenate(result)
-    whole = whole[whole[:, 0] < count]
-    return np.where(whole < count, whole, whole[:, :1])
+    indices = np.concatenate(result)
+    indices = indices[indices[:, 0] < count]
+    return np.where(indices < count, indices, indices[:, :1])
 
 
 def neighbors(lanes: Indices, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
@@ -120,7 +120,7 @@ def solve_blocks(
     time: Float[np.ndarray, " time"],
     blocks: Sequence[Block],
     put: Callable[[slice, Any, Int[np.ndarray, " lane"]], None],
-    each: Callable[[Callable[[Block], int], Iterable[Block]], Iterator[int]],
+    parallel_map: Callable[[Callable[[Block], int], Iterable[Block]], Iterator[int]],
 ) -> Iterator[int]:
     """Solve the blocks of a grid, and yield the number of instants of each.
 
@@ -139,22 +139,24 @@ def solve_blocks(
     put : callable
         Stores a block, given the slice of its instants, their states in the form of an anchor's, time last, and their
         outcomes. Several threads may call it at once; the arrays are reused after the call.
-    each : callable
+    parallel_map : callable
         Works like `map`; it may call from several threads at once.
     """
     size = max(block.count for block in blocks) if blocks else 0
-    around = {block: path.anchors_around(time[block.first], time[block.first + block.count - 1]) for block in blocks}
-    most = max(map(len, around.values()), default=0)
+    anchors_by_block = {
+        block: path.anchors_around(time[block.first], time[block.first + block.count - 1]) for block in blocks
+    }
+    anchor_count = max(map(len, anchors_by_block.values()), default=0)
 
     def load(buffer: SolveBuffer, block: Block) -> int:
-        block_time, anchors = time[block.indices], around[block]
+        block_time, anchors = time[block.indices], anchors_by_block[block]
         buffer.put_anchors(zip(*(anchor.leaves for anchor in anchors), strict=True))
-        neighbor, known = _neighbors(block.count, block.stride)
+        neighbor, has_neighbor = _neighbors(block.count, block.stride)
         instants = np.array([anchor.instant for anchor in anchors])
         nearest = nearest_instants(instants, block_time)
         to_neighbor, to_anchor = block_time - block_time[neighbor], block_time - instants[nearest]
-        near = known & (np.abs(to_neighbor) <= np.abs(to_anchor))
-        sources = np.where(near, neighbor, buffer.first_anchor + nearest), np.where(near, to_neighbor, to_anchor)
+        is_near = has_neighbor & (np.abs(to_neighbor) <= np.abs(to_anchor))
+        sources = np.where(is_near, neighbor, buffer.first_anchor + nearest), np.where(is_near, to_neighbor, to_anchor)
         buffer.load(block_time, sources, rounds(block.count, block.stride, buffer.width))
         return block.count
 
@@ -162,5 +164,5 @@ def solve_blocks(
         put(block.indices, state, status)
 
     return solve_in_buffers(
-        lambda: SolveBuffer(solver, path.anchors[0].state, size, most), blocks, load, put_block, each
+        lambda: SolveBuffer(solver, path.anchors[0].state, size, anchor_count), blocks, load, put_block, parallel_map
     )

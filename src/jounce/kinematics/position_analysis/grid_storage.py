@@ -85,18 +85,18 @@ def solve_grid(
     coordinates, outputs = state if store is None else store.state
     if keeps_series:
         return Solved(coordinates, outputs, status, faults)
-    again: Any = partial(solve_grid, solver, path, time, None, threads, keep=True)
-    return Solved(lambda: again().coordinates, outputs, status, faults)
+    recomputed: Any = partial(solve_grid, solver, path, time, None, threads, keep=True)
+    return Solved(lambda: recomputed().coordinates, outputs, status, faults)
 
 
 def _without_decrease(progress: Callable[[int, int], None]) -> Callable[[int, int], None]:
     """Return a progress callback whose count never decreases, although some instants may be solved twice."""
-    furthest = 0
+    largest = 0
 
     def report(done: int, total: int) -> None:
-        nonlocal furthest
-        furthest = max(furthest, done)
-        progress(furthest, total)
+        nonlocal largest
+        largest = max(largest, done)
+        progress(largest, total)
 
     return report
 
@@ -121,8 +121,8 @@ def _solved_at_once(
     for first in range(0, len(time), CHUNK):
         chunk = time[first : first + CHUNK]
         start, end, count = chunk[0], chunk[-1], len(chunk)
-        near = any(start - width < point.instant < end + width for point, width in points)
-        if count > LONG_GRID and end < path.ended_at and not near:
+        is_near = any(start - width < point.instant < end + width for point, width in points)
+        if count > LONG_GRID and end < path.ended_at and not is_near:
             stride = stride_of(solver, count, count, len(path.anchors_around(start, end)))
             blocks[first] = blocks_for(solver, first, count, stride)
     done, queue = 0, [*itertools.chain(*blocks.values())]
@@ -154,14 +154,14 @@ class _Store:
         The series of a failed instant may overflow; the instant is solved again.
         """
         stored_coordinates, stored_outputs = self.state
-        for name, whole in stored_coordinates.items():
-            whole[..., lanes] = coordinates[name]
-        for whole, part in zip(stored_outputs, outputs, strict=True):
+        for name, array in stored_coordinates.items():
+            array[..., lanes] = coordinates[name]
+        for array, part in zip(stored_outputs, outputs, strict=True):
             if series:
                 with np.errstate(over="ignore"):
-                    plain_derivatives(part, out=whole[..., lanes])
+                    plain_derivatives(part, out=array[..., lanes])
             else:
-                whole[..., lanes] = part
+                array[..., lanes] = part
 
 
 def solved_chunks(
@@ -170,14 +170,14 @@ def solved_chunks(
     time: Instants,
     progress: Callable[[int, int], None] | None,
     threads: int,
-    without: Collection[int] = (),
+    skipped: Collection[int] = (),
 ) -> Iterator[tuple[int, GridSolver]]:
     """Yield the solved chunks of a grid one after another, with the index of their first instant.
 
-    Chunks that are solved already are skipped; `without` has the indices of their first instants.
+    Chunks that are solved already are skipped; `skipped` has the indices of their first instants.
     """
     for first in range(0, len(time), CHUNK):
-        if first in without:
+        if first in skipped:
             continue
 
         def report(done: int, _: int, first: int = first) -> None:

@@ -26,11 +26,11 @@ BETWEEN = 0.618  # of the time: the instant of comparison between the first and 
 
 def with_idle_motions_held(mechanism: Mechanism, idle: IdleMotions) -> Mechanism:
     """Return the mechanism with joints that suppress its idle motions: no spin about the idle axes."""
-    taken = {*mechanism.joints, *mechanism.drivers, *mechanism.initial}
+    used_names = {*mechanism.joints, *mechanism.drivers, *mechanism.initial}
     holds = {}
     for body, (_, axis) in idle.items():
         name = f"{body}_spin"
-        while name in taken:
+        while name in used_names:
             name += "_"
         holds[name] = SpinHold((body,), list(axis))
     return dataclasses.replace(mechanism, joints={**mechanism.joints, **holds})
@@ -46,8 +46,8 @@ def idle_words(idle: IdleMotions, *, axes: bool = False) -> str:
     """
     reported = []
     for first, (bodies, axis) in idle.items():
-        about = f" about [{', '.join(f'{x + 0.0:.4g}' for x in axis)}] of {first}" if axes else ""
-        reported.append(" and ".join(bodies) + (" as one" if len(bodies) > 1 else "") + about)
+        axis_phrase = f" about [{', '.join(f'{x + 0.0:.4g}' for x in axis)}] of {first}" if axes else ""
+        reported.append(" and ".join(bodies) + (" as one" if len(bodies) > 1 else "") + axis_phrase)
     return "; ".join(reported)
 
 
@@ -89,9 +89,9 @@ def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable
             check: Any = functools.partial(check_independent, mechanism, idle, given.get("time"), solver())
             check()
             warn_of_idle(idle)
-            rest: Any = {name: value for name, value in keywords.items() if name != "mechanism"}
+            other_keywords: Any = {name: value for name, value in keywords.items() if name != "mechanism"}
             solve_held: Any = function
-            result: Any = solve_held(mechanism, *arguments[1:], **rest)
+            result: Any = solve_held(mechanism, *arguments[1:], **other_keywords)
             if isinstance(result, Motion):  # outputs requested later must not depend on the idle motions either
                 vars(result).update(mechanism=given["mechanism"], check_idle=check)
             return cast("R", result)
@@ -141,19 +141,19 @@ def check_independent(
         return
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
     first, duration = float(instants[0]), abs(float(instants[-1]) - float(instants[0])) or 1.0
-    held = [name for name, joint in mechanism.joints.items() if isinstance(joint, SpinHold)]
-    holds = {name: dataclasses.replace(mechanism.joints[name], rate=k / duration) for k, name in enumerate(held, 1)}
+    names = [name for name, joint in mechanism.joints.items() if isinstance(joint, SpinHold)]
+    holds = {name: dataclasses.replace(mechanism.joints[name], rate=k / duration) for k, name in enumerate(names, 1)}
     posed = dataclasses.replace(mechanism, outputs=checked, forces={}, initial={})
     spinning = dataclasses.replace(posed, joints={**posed.joints, **holds})
     middle = float(instants[0] + BETWEEN * (instants[-1] - instants[0]))
-    some = sorted({first, middle, float(instants[-1])}, reverse=bool(instants[-1] < instants[0]))
-    still, spun = (solve(made, some, ORDER, strict=False) for made in (posed, spinning))
-    solved = (still.status == Status.OK) & (spun.status == Status.OK)
-    scale = duration ** -np.arange(ORDER + 1.0) * still.model.length
+    sample_times = sorted({first, middle, float(instants[-1])}, reverse=bool(instants[-1] < instants[0]))
+    held_motion, spun_motion = (solve(variant, sample_times, ORDER, strict=False) for variant in (posed, spinning))
+    solved = (held_motion.status == Status.OK) & (spun_motion.status == Status.OK)
+    scale = duration ** -np.arange(ORDER + 1.0) * held_motion.model.length
     for name in checked:
-        one, other = (np.asarray(motion.outputs[name])[solved] for motion in (still, spun))
-        size = np.maximum(np.abs(one), np.abs(other)).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
-        difference = np.abs(one - other).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
+        a, b = (np.asarray(motion.outputs[name])[solved] for motion in (held_motion, spun_motion))
+        size = np.maximum(np.abs(a), np.abs(b)).reshape(len(a), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
+        difference = np.abs(a - b).reshape(len(a), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
         if not (difference <= DEPENDS * np.maximum(size, scale)).all():
             message = (
                 f"depends on a spin that nothing prescribes: {idle_words(idle, axes=True)} may spin without moving "

@@ -29,11 +29,11 @@ def dead_end_words(motion: Motion, index: int) -> str:
         return ""
     before, instant = float(motion.time[index - 1]), float(motion.time[index])
     _, coordinates = motion.poses
-    last = posed(mechanism, {name: np.asarray(c)[0, ..., index - 1] for name, c in coordinates.items()})
+    last_solved = posed(mechanism, {name: np.asarray(c)[0, ..., index - 1] for name, c in coordinates.items()})
     name = next(iter(drivers)) if len(drivers) == 1 else TIME
     try:
         target = instant if name == TIME else law_values(mechanism, instant)[name]
-        curve = trace(last, before, driver=name, order=0, count=2, length=LENGTH)
+        curve = trace(last_solved, before, driver=name, order=0, count=2, length=LENGTH)
     except JounceError:
         return ""  # the message already names the failure
     end = _end_before(curve, target)
@@ -42,18 +42,18 @@ def dead_end_words(motion: Motion, index: int) -> str:
     value, other = end
     if name == TIME:
         values = law_values(mechanism, value)
-        words = ", ".join(f"{driver} = {x:.9g}" for driver, x in values.items())
+        text = ", ".join(f"{driver} = {x:.9g}" for driver, x in values.items())
         return (
-            f"its drivers lead it to a dead point at t = {value:.9g} s, where {words}: from there they can only go back"
+            f"its drivers lead it to a dead point at t = {value:.9g} s, where {text}: from there they can only go back"
         )
-    far = "" if other is None else f", on another branch, which leads to {_words(other, curve.unit)}"
-    led = output_laws(motion.mechanism)
-    if name in led:
+    hint = "" if other is None else f", on another branch, which leads to {_words(other, curve.unit)}"
+    laws = output_laws(motion.mechanism)
+    if name in laws:
         return (
-            f"{led[name].output} can go no further than {_words(value, curve.unit)}: there it does not determine the "
+            f"{laws[name].output} can go no further than {_words(value, curve.unit)}: there it does not determine the "
             f"driver {name}, which goes on past this dead point while it turns back"
         )
-    return f"{name} can go no further than {_words(value, curve.unit)}: past this dead point it turns back{far}"
+    return f"{name} can go no further than {_words(value, curve.unit)}: past this dead point it turns back{hint}"
 
 
 def _end_before(curve: Curve, target: float) -> tuple[float, float | None] | None:
@@ -67,8 +67,8 @@ def _end_before(curve: Curve, target: float) -> tuple[float, float | None] | Non
     limits = [x.value for x in curve.turning_points]
     if not any(abs(x - value) <= slack for x in limits):
         return None  # the curve was traced no further
-    beyond = [b for b in curve.branches[1:] if abs((b.high if upwards else b.low) - value) <= slack]
-    ends = [b.low if upwards else b.high for b in beyond]
+    branches = [b for b in curve.branches[1:] if abs((b.high if upwards else b.low) - value) <= slack]
+    ends = [b.low if upwards else b.high for b in branches]
     return value, next((x for x in ends if any(abs(x - y) <= slack for y in limits)), None)
 
 

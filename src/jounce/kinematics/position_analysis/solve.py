@@ -218,12 +218,12 @@ def _followed(
 ) -> tuple[Solver, FollowedPath]:
     """Return the solver of a grid, and the motion followed from its first instant to its last."""
     first, last = float(instants[0]), float(instants[-1])
-    lost = lost_orders(mechanism.outputs.values())
+    extra_order = lost_orders(mechanism.outputs.values())
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
-    check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
+    check_laws(mechanism, np.array([first, last]), order + extra_order, forces=of_forces)
     guessed = build(chosen(with_output_drivers(mechanism), first))
     expect(len(instants))
-    settings = max(order + lost, LOWEST_ORDER), float(tolerance), refine, order
+    settings = max(order + extra_order, LOWEST_ORDER), float(tolerance), refine, order
     if not guessed.system.rank_is_open:  # otherwise the program depends on the assembled bodies
         prepare_later(Solver(guessed, *settings).prepare, "take_steps", guessed.system, settings[0])
     try:
@@ -233,8 +233,8 @@ def _followed(
             error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
         raise
     curves = ends_of(model)
-    if beyond := beyond_end(curves, coordinates):
-        raise SolveError(_failure(first, Status.END_OF_CURVE, beyond), status=Status.END_OF_CURVE)
+    if fault := beyond_end(curves, coordinates):
+        raise SolveError(_failure(first, Status.END_OF_CURVE, fault), status=Status.END_OF_CURVE)
     check_turns(mechanism, model, coordinates, first)
     solver = Solver(model, *settings)
     prepare_outputs(mechanism, model, solver.order)
@@ -252,9 +252,9 @@ def _check_count(model: Model, path: FollowedPath) -> None:
     """Raise SolveError where spatial gears have lost count of their turns on the way."""
     groups = [group for group in model.system.groups if getattr(group.element, "whole", None) is not None]
     history = history_of(path.anchors) if groups else None
-    lost = None if history is None else lost_count(model.system.groups, history)
-    if lost is not None:
-        group, instance, instant = lost
+    miscount = None if history is None else lost_count(model.system.groups, history)
+    if miscount is not None:
+        group, instance, instant = miscount
         name = model.rows[group_rows(model)[group]][instance]
         message = (
             f"{name} has lost count of its turns before t = {instant:g} s: solve to a higher order, or use a ratio"
@@ -276,16 +276,16 @@ def raise_for_status(motion: Any) -> None:
     status = Status(int(motion.status[first]))
     message = _failure(float(motion.time[first]), status, motion.faults.get(first, ""))
     total = len(motion.time)
-    if isinstance(motion, Motion) and (ahead := dead_end_words(motion, first)):
-        message += f"; {ahead}"
+    if isinstance(motion, Motion) and (hint := dead_end_words(motion, first)):
+        message += f"; {hint}"
     solved = f"{total - failed.size} of {total} instants were solved"
     raise SolveError(f"{message} ({solved})", motion=motion, status=status)
 
 
 def checked_order(order: Any) -> int:
     """Return the order of derivatives as an int, or raise MechanismError if it is invalid."""
-    whole = isinstance(order, numbers.Integral) and not isinstance(order, bool)
-    if not whole or not 0 <= int(order) <= HIGHEST_ORDER:
+    is_integer = isinstance(order, numbers.Integral) and not isinstance(order, bool)
+    if not is_integer or not 0 <= int(order) <= HIGHEST_ORDER:
         message = f"the order of derivatives must be a whole number from 0 to {HIGHEST_ORDER}"
         raise MechanismError(message, name="order", value=order)
     return int(order)
@@ -293,5 +293,5 @@ def checked_order(order: Any) -> int:
 
 def _failure(instant: float, status: Status, fault: str) -> str:
     """Return a message with the instant of a failure, its kind, and a remedy."""
-    where = f"t = {instant:g} s" + (f", {fault}" if fault else "")
-    return f"{where}: {status.name.lower().replace('_', ' ')}: {status.advice}"
+    place = f"t = {instant:g} s" + (f", {fault}" if fault else "")
+    return f"{place}: {status.name.lower().replace('_', ' ')}: {status.advice}"

@@ -43,36 +43,36 @@ class SolveBuffer:
     """
 
     def __init__(self, solver: Solver, like: SolvedState, size: int, anchors: int):
-        own, of_designs = solver.own or {}, solver.own is not None
+        design, of_designs = solver.own or {}, solver.own is not None
         self.first_anchor, outputs = (0, like[1]) if of_designs else (size, ())
-        known, form = jax.tree.flatten(solver.needed(like) if of_designs else like)
-        shapes = [(*leaf.shape[:-1], self.first_anchor + anchors) for leaf in known]
-        shapes += [*((*value.shape[:-1], size) for value in (*outputs, *own.values())), *[(size,)] * 4]
+        leaves, form = jax.tree.flatten(solver.needed(like) if of_designs else like)
+        shapes = [(*leaf.shape[:-1], self.first_anchor + anchors) for leaf in leaves]
+        shapes += [*((*value.shape[:-1], size) for value in (*outputs, *design.values())), *[(size,)] * 4]
         kinds = [*[float] * (len(shapes) - 2), *[int] * 2]
         arrays = iter(arrays_in(lend(bytes_needed(shapes)), shapes, kinds))
-        self._known = jax.tree.unflatten(form, [next(arrays) for _ in known])
-        nowhere = dict.fromkeys(like[0]), tuple([next(arrays) for _ in outputs]), None
-        self.state: tuple[Any, Any, Any] = nowhere if of_designs else self._known
-        self.own = {k: next(arrays) for k in own} if of_designs else None
+        self._known = jax.tree.unflatten(form, [next(arrays) for _ in leaves])
+        outputs_only = dict.fromkeys(like[0]), tuple([next(arrays) for _ in outputs]), None
+        self.state: tuple[Any, Any, Any] = outputs_only if of_designs else self._known
+        self.own = {k: next(arrays) for k in design} if of_designs else None
         self.time, self.step, self.status, self.source = arrays
         self.source[:] = 0
         self.width = solver.program.width
-        needed = self._known if of_designs else solver.needed(self._known)
-        self._run = solver.rounds(needed, self.state, self.step, self.time, self.status, self.source, self.own)
+        source_data = self._known if of_designs else solver.needed(self._known)
+        self._run = solver.rounds(source_data, self.state, self.step, self.time, self.status, self.source, self.own)
         self.rounds: Rounds = np.zeros((0, self.width), np.int64)
 
     def put_anchors(self, parts: Iterable[Sequence[np.ndarray]]) -> None:
         """Store the anchors: for each leaf of their state, the parts to concatenate along the last axis."""
-        for whole, columns in zip(jax.tree.leaves(self._known), parts, strict=True):
+        for array, columns in zip(jax.tree.leaves(self._known), parts, strict=True):
             count = sum(x.shape[-1] for x in columns)
-            np.concatenate(columns, axis=-1, out=whole[..., self.first_anchor : self.first_anchor + count])
+            np.concatenate(columns, axis=-1, out=array[..., self.first_anchor : self.first_anchor + count])
 
     def load(
         self,
         time: Float[np.ndarray, " time"],
         sources: tuple[Indices, Float[np.ndarray, " time"]],
         rounds: Rounds,
-        own: Mapping[int, np.ndarray] = MappingProxyType({}),
+        design: Mapping[int, np.ndarray] = MappingProxyType({}),
     ) -> None:
         """Load instants to be solved.
 
@@ -85,15 +85,15 @@ class SolveBuffer:
             step from there, s.
         rounds : array of int, shape (rounds, lanes)
             Instants of each round.
-        own : dict of int to array, optional
+        design : dict of int to array, optional
             Values of the designs, designs last; each design has the same number of the instants.
         """
         count = len(time)
         self.time[:count], self.rounds = time, rounds
         self.source[:count], self.step[:count] = sources
-        for k, whole in (self.own or {}).items():
-            designs = own[k].shape[-1]
-            whole[..., :count].reshape(*whole.shape[:-1], designs, -1)[...] = own[k][..., None]
+        for k, array in (self.own or {}).items():
+            designs = design[k].shape[-1]
+            array[..., :count].reshape(*array.shape[:-1], designs, -1)[...] = design[k][..., None]
 
     def solve(self) -> None:
         """Solve the instants loaded last."""
@@ -109,7 +109,7 @@ def solve_in_buffers(
     items: Sequence[Item],
     load: Callable[[SolveBuffer, Item], int],
     put: Callable[[Item, Any, Indices], None],
-    each: Callable[[Callable[[Item], int], Iterable[Item]], Iterator[int]],
+    parallel_map: Callable[[Callable[[Item], int], Iterable[Item]], Iterator[int]],
 ) -> Iterator[int]:
     """Solve items, each in a buffer, and yield the number of instants of each.
 
@@ -124,7 +124,7 @@ def solve_in_buffers(
     put : callable
         Stores the states and outcomes of the instants of an item. Several threads may call it at once; the arrays are
         reused after the call.
-    each : callable
+    parallel_map : callable
         Works like `map`; it may call from several threads at once.
     """
     idle_buffers: list[SolveBuffer] = []  # of threads between two items
@@ -139,4 +139,4 @@ def solve_in_buffers(
         idle_buffers.append(buffer)
         return count
 
-    yield from each(solve, items)
+    yield from parallel_map(solve, items)

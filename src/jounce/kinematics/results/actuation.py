@@ -23,10 +23,10 @@ def actuated(motion: Motion) -> Motion:
     motion is returned unchanged.
     """
     mechanism = motion.mechanism
-    led = output_laws(mechanism)
-    if not led or not np.any(motion.status == Status.OK):
+    held_outputs = output_laws(mechanism)
+    if not held_outputs or not np.any(motion.status == Status.OK):
         return motion
-    laws = {name: _law(motion, name) for name in led}
+    laws = {name: _law(motion, name) for name in held_outputs}
     drivers = {name: dataclasses.replace(mechanism.drivers[name], motion=law) for name, law in laws.items()}
     driven = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **drivers})
     model = _counted(build(driven), motion.model, _row_scale(mechanism, motion.model, float(motion.time[0])))
@@ -52,9 +52,9 @@ def _row_scale(mechanism: Mechanism, driven: Model, instant: float) -> Float[np.
 
 def _counted(model: Model, driven: Model, row_scale: Float[np.ndarray, "row 1"]) -> Model:
     """Return the model of the drivers, with angle counts, forces and rank of the model that held the outputs."""
-    groups, held = counted_as_in(model.system.groups, driven), driven.system
-    known = {"forces": held.forces, "outputs": held.outputs, "row_scale": row_scale, "rank": held.rank}
-    system = with_fields(model.system, groups=groups, **known)
+    groups, source = counted_as_in(model.system.groups, driven), driven.system
+    fields = {"forces": source.forces, "outputs": source.outputs, "row_scale": row_scale, "rank": source.rank}
+    system = with_fields(model.system, groups=groups, **fields)
     return dataclasses.replace(
         model, system=system, reference=driven.reference, prescribed=driven.prescribed, history=driven.history
     )

@@ -185,8 +185,8 @@ class Motion(Tabulated):
         [1.570796, 0.0, -10.335426]
         """
         check_name("driver", name, self.mechanism.drivers, MechanismError, name="driver")
-        turning = is_turning(self.mechanism.drivers[name])
-        return self.evaluate((DriverAngleOutput if turning else DriverDisplacementOutput)(name), name)
+        is_angle = is_turning(self.mechanism.drivers[name])
+        return self.evaluate((DriverAngleOutput if is_angle else DriverDisplacementOutput)(name), name)
 
     def driver_law(self, name: str) -> HermiteMotion:
         """Return the law of a driver through the solved instants, with the derivatives of the motion.
@@ -201,8 +201,8 @@ class Motion(Tabulated):
 
     def driver_coefficients(self, name: str) -> Float[Numbers, "order 1 time"]:
         """Return the Taylor coefficients of the coordinate of a driver, from the poses of its bodies."""
-        bare: Any = dataclasses.replace(self.mechanism.drivers[name], motion=0.0)
-        return self._coefficients(output_group(bare, self.mechanism, self.model, f"drivers.{name}"))[:, :, 0]
+        without_law: Any = dataclasses.replace(self.mechanism.drivers[name], motion=0.0)
+        return self._coefficients(output_group(without_law, self.mechanism, self.model, f"drivers.{name}"))[:, :, 0]
 
     def __repr__(self) -> str:
         solved = int(np.sum(self.status == Status.OK))
@@ -316,12 +316,12 @@ class Motion(Tabulated):
     def _check_finite(self, values: Float[np.ndarray, "time derivative *component"], name: str) -> None:
         """Raise MechanismError for the first solved instant at which an output is not finite."""
         finite = np.isfinite(values).all(axis=tuple(range(2, values.ndim)))
-        bad = ~finite & (self.status == Status.OK)[:, None]
-        if bad.any():
-            lane, level = (int(k) for k in np.argwhere(bad)[0])
-            what = f"its derivative {level}" if level else "it"
-            at = f"{what} has no finite value at t = {self.time[lane]:g} s"
-            raise MechanismError(f"{at}; {_UNDEFINED}", name=name)
+        undefined = ~finite & (self.status == Status.OK)[:, None]
+        if undefined.any():
+            lane, level = (int(k) for k in np.argwhere(undefined)[0])
+            subject = f"its derivative {level}" if level else "it"
+            message = f"{subject} has no finite value at t = {self.time[lane]:g} s"
+            raise MechanismError(f"{message}; {_UNDEFINED}", name=name)
 
     def _continued(
         self, group: Group, coefficients: Float[Numbers, "order component instance time"]
@@ -337,8 +337,8 @@ class Motion(Tabulated):
             return coefficients
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
             angles = np.where(self.status == Status.OK, coefficients[0, :, k], np.nan)
-            passed = history.sampled(lambda q, b=bodies: euler_angles_of(element.sequence, attitudes_of(b, q)))
-            coefficients[0, :, k] = continued(element, angles, self.time, passed)
+            between = history.sampled(lambda q, b=bodies: euler_angles_of(element.sequence, attitudes_of(b, q)))
+            coefficients[0, :, k] = continued(element, angles, self.time, between)
         return coefficients
 
     @property

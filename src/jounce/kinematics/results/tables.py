@@ -110,5 +110,5 @@ def _by_derivative(dataset: xarray.Dataset) -> Iterator[tuple[str, int, xarray.D
             if order and np.isnan(part).all() and not np.isnan(variable.sel(derivative=0)).all():
                 continue  # the quantity uses up orders and has no derivative this high
             unit = derivative_unit(str(variable.attrs.get("units", "1")), order)
-            words = f"derivative {order} of {name}" if order else str(name)
-            yield str(name), order, part.assign_attrs(units=unit, long_name=words)
+            label = f"derivative {order} of {name}" if order else str(name)
+            yield str(name), order, part.assign_attrs(units=unit, long_name=label)

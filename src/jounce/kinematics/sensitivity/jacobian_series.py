@@ -63,8 +63,8 @@ def slopes_of_groups(groups: Sequence[Group], pose: Pose, time: Jet) -> list[lis
 
     `pose`, (..., bodies, batch), with the ground first, has the order of the time.
     """
-    at = [(group, [pose.take(indices) for indices in group.bodies]) for group in groups]
-    return [[slopes(group.element, poses, time, slot) for slot in group.moving_slots] for group, poses in at]
+    posed_groups = [(group, [pose.take(indices) for indices in group.bodies]) for group in groups]
+    return [[slopes(group.element, poses, time, slot) for slot in group.moving_slots] for group, poses in posed_groups]
 
 
 def along_displacements(body: Any, changed: Callable[[Any], Any]) -> Slope:
@@ -105,7 +105,7 @@ def jacobian_series(system: System, pose: Pose, time: Jet) -> Float[Numbers, "or
     return jnp.concatenate([(slope * scale).reshape(len(slope), -1, slope.shape[-1]) for slope in blocks], axis=1)
 
 
-def solved_series(system: System, entries: Float[Numbers, "order entry batch"], right: Series) -> Series:
+def solved_series(system: System, entries: Float[Numbers, "order entry batch"], rhs: Series) -> Series:
     """Return the series x with ``J x = right``, order after order, with the factors of the first coefficient of J.
 
     Derivatives and transposes are those of the linear equations; the factorization itself is not differentiated.
@@ -116,7 +116,7 @@ def solved_series(system: System, entries: Float[Numbers, "order entry batch"], 
         The mechanism, with as many rows as columns.
     entries : array of shape (order + 1, entries, batch)
         Series of the entries, as returned by `jacobian_series`.
-    right : array of shape (order + 1, rows, batch)
+    rhs : array of shape (order + 1, rows, batch)
         Right-hand side, rows unscaled.
 
     Returns
@@ -124,11 +124,11 @@ def solved_series(system: System, entries: Float[Numbers, "order entry batch"], 
     array of shape (order + 1, columns, batch)
     """
     scale = _row_scale(system, entries)
-    fixed = jax.lax.stop_gradient(entries[0])
+    values = jax.lax.stop_gradient(entries[0])
     if system.fronts is None:
-        factor: Any = DenseFactor.of(system.pattern.dense(fixed) * scale[:, :, None])
+        factor: Any = DenseFactor.of(system.pattern.dense(values) * scale[:, :, None])
     else:
-        factor = FrontalFactor.of(system.fronts, fixed, scale)
+        factor = FrontalFactor.of(system.fronts, values, scale)
     matrices, product, transposed = _products(system, entries, scale)
 
     def multiplied(x: Any) -> Any:
@@ -141,15 +141,15 @@ def solved_series(system: System, entries: Float[Numbers, "order entry batch"], 
     def solve_transposed(_: Any, b: Any) -> Any:  # the transpose of a convolution runs backwards in the orders
         return _in_order(transposed, jax.lax.stop_gradient(matrices), factor.solve_transposed, b[::-1])[::-1]
 
-    return jax.lax.custom_linear_solve(multiplied, right * scale[None], solve, solve_transposed)
+    return jax.lax.custom_linear_solve(multiplied, rhs * scale[None], solve, solve_transposed)
 
 
 def solver(
     product: Callable[[Any], Any], solve: Callable[[Any], Any], solve_transposed: Callable[[Any], Any]
 ) -> Callable[[Any], Any]:
     """Return a solver of linear equations whose matrix is given by its products, with implicit derivatives."""
-    return lambda right: jax.lax.custom_linear_solve(
-        product, right, lambda _, b: solve(b), lambda _, b: solve_transposed(b)
+    return lambda rhs: jax.lax.custom_linear_solve(
+        product, rhs, lambda _, b: solve(b), lambda _, b: solve_transposed(b)
     )
 
 
@@ -177,21 +177,21 @@ def _products(system: System, entries: Any, scale: Any) -> tuple[Any, _Product, 
         matrices = jax.vmap(pattern.dense)(entries) * scale[None, :, :, None]
         forward = _Product(lambda x: x[None], lambda terms: jnp.sum(terms, axis=-2))
         return matrices, forward, _Product(lambda y: y[:, None], lambda terms: jnp.sum(terms, axis=-3))
-    matrices = jnp.stack([pattern.by_row(each) * scale[:, None, None] for each in entries])
+    matrices = jnp.stack([pattern.by_row(level) * scale[:, None, None] for level in entries])
     forward = _Product(pattern.touched, lambda terms: jnp.sum(terms, axis=(-3, -2)))
     return matrices, forward, _Product(lambda y: y[:, None, None], lambda terms: terms, pattern.summed)
 
 
-def _in_order(product: _Product, matrices: Any, solve: Callable[[Any], Any], right: Series) -> Series:
+def _in_order(product: _Product, matrices: Any, solve: Callable[[Any], Any], rhs: Series) -> Series:
     """Return the series x of a product of series, given the other factor and the product, in one loop over orders."""
 
     def step(spread: Any, k: Any) -> tuple[Any, Any]:
         def added(j: Any, sums: Any) -> Any:
             return sums + product.added(matrices[j] * spread[k - j])
 
-        known = jax.lax.fori_loop(1, k + 1, added, jnp.zeros_like(product.added(matrices[0] * spread[0])))
-        solved = solve(right[k] - product.collected(known))
+        known_sum = jax.lax.fori_loop(1, k + 1, added, jnp.zeros_like(product.added(matrices[0] * spread[0])))
+        solved = solve(rhs[k] - product.collected(known_sum))
         return spread.at[k].set(product.spread(solved)), solved
 
-    blank = jnp.zeros((len(right), *jax.eval_shape(product.spread, right[0]).shape))
-    return jax.lax.scan(step, blank, np.arange(len(right)))[1]
+    blank = jnp.zeros((len(rhs), *jax.eval_shape(product.spread, rhs[0]).shape))
+    return jax.lax.scan(step, blank, np.arange(len(rhs)))[1]

@@ -97,13 +97,13 @@ def differentiable_motion(
         Solves a mechanism of plain numbers at the instants, strictly or not. Its errors are raised if JAX knows the
         numbers; otherwise a motion without a start is NaN.
     """
-    (given, made), driven = template(mechanism), _builder(mechanism, with_output_drivers)
-    shown = _builder(mechanism, without_output_laws) if output_laws(mechanism) else driven
+    (given, make_mechanism), driven = template(mechanism), _builder(mechanism, with_output_drivers)
+    reported = _builder(mechanism, without_output_laws) if output_laws(mechanism) else driven
     values = tuple(x if x.dtype == np.float64 else x.astype(float) for x in given)
     shapes = solved_shapes(mechanism, len(instants), levels)
 
     def on_the_host(strict: bool, values: Values) -> Solved:
-        motion = solve(made(values), strict)
+        motion = solve(make_mechanism(values), strict)
         if np.any(motion.status == Status.OK):  # otherwise drivers that follow from outputs are unknown
             return _solved(motion)
         return _failed(shapes, motion.status)
@@ -113,22 +113,22 @@ def differentiable_motion(
         if not any(isinstance(value, Tracer) for value in values):
             return jax.tree.map(jnp.asarray, on_the_host(True, values))
         solve_one = partial(solved_or_failed, partial(on_the_host, False), shapes)
-        each = partial(_one_by_one, solve_one, shapes, [np.ndim(value) for value in values])
-        return called_back(each, shapes, values, vmap_method="broadcast_all")
+        solve_each = partial(_one_by_one, solve_one, shapes, [np.ndim(value) for value in values])
+        return called_back(solve_each, shapes, values, vmap_method="broadcast_all")
 
     @solution.defjvp
     def along(primals: tuple[Values], tangents: tuple[Values]) -> tuple[Solved, Solved]:
         (values,), (changes,) = primals, tangents
         solved = solution(values)
-        still = jax.tree.map(jnp.zeros_like, solved)
-        return solved, still._replace(coordinates=driven.change(values, changes, solved, instants))
+        no_change = jax.tree.map(jnp.zeros_like, solved)
+        return solved, no_change._replace(coordinates=driven.change(values, changes, solved, instants))
 
     solved = solution(values)
     model = driven(values, solved.length, solved.angles, solved.coordinates)
-    if shown is driven:
+    if reported is driven:
         return solved, (model, model)
     angles = solved.angles._replace(angle=(solved.driven, *solved.angles.angle[1:]))
-    return solved, (model, shown(values, solved.length, angles, solved.coordinates))
+    return solved, (model, reported(values, solved.length, angles, solved.coordinates))
 
 
 def solved_shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
@@ -244,8 +244,8 @@ class _Builder:
 
     def __call__(self, values: Values, length: Any, angles: Angles | None, coordinates: Any) -> Model:
         """Return the model; see `traced_model`, and `numbers`."""
-        numbers, which = self.numbers(values, length, angles, coordinates)
-        return self.model(numbers, which, angles is not None)
+        numbers, indices = self.numbers(values, length, angles, coordinates)
+        return self.model(numbers, indices, angles is not None)
 
     def numbers(self, values: Values, length: Any, angles: Angles | None, coordinates: Any) -> tuple[list[Any], Any]:
         """Return the numbers of a system that depend on traced values, and the indices of these leaves.
@@ -256,37 +256,37 @@ class _Builder:
         numbers = self._make(values, length, angles, coordinates, counted=angles is not None)
         return numbers, self._models[angles is not None][2]
 
-    def model(self, numbers: Sequence[Any], which: tuple[int, ...], counted: bool) -> Model:
+    def model(self, numbers: Sequence[Any], indices: tuple[int, ...], counted: bool) -> Model:
         """Return the model with given numbers."""
         model, leaves, _, structure = self._models[counted]
-        known = dict(zip(which, numbers, strict=True))
-        whole = [known.get(k, leaf) for k, leaf in enumerate(leaves)]
-        return dataclasses.replace(model, system=jax.tree.unflatten(structure, whole))
+        replaced = dict(zip(indices, numbers, strict=True))
+        all_leaves = [replaced.get(k, leaf) for k, leaf in enumerate(leaves)]
+        return dataclasses.replace(model, system=jax.tree.unflatten(structure, all_leaves))
 
     def _numbers(self, values: Values, length: Any, angles: Any, coordinates: Any, *, counted: bool) -> list[Any]:
         model = traced_model(self._made_of(self._made(values)), length, angles, first_of(coordinates))
         check_not_redundant(model)
         leaves, structure = jax.tree.flatten(model.system)
-        which = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
-        fixed = [None if k in which else leaf for k, leaf in enumerate(leaves)]
-        bare = with_fields(model.system, groups=(), forces=(), outputs=(), column_scale=np.ones(1))  # nothing traced
-        plain = dataclasses.replace(model, system=bare, guess={}, reference={})
-        self._models[counted] = plain, fixed, which, structure
-        return [leaves[k] for k in which]
+        indices = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
+        fixed = [None if k in indices else leaf for k, leaf in enumerate(leaves)]
+        system = with_fields(model.system, groups=(), forces=(), outputs=(), column_scale=np.ones(1))  # nothing traced
+        template_model = dataclasses.replace(model, system=system, guess={}, reference={})
+        self._models[counted] = template_model, fixed, indices, structure
+        return [leaves[k] for k in indices]
 
     def _change(self, values: Values, changes: Values, solved: Solved, instants: Any) -> dict[str, Any]:
         """Return the Taylor coefficients of the change of the coordinates of a motion with the values of the design."""
         regular = solved.status == int(Status.OK)
         coordinates = {name: _where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
         instants = jnp.where(regular, instants, instants[0])
-        first = {name: x[:1, ..., :1] for name, x in coordinates.items() if name != "angular_velocity"}
-        moved = jax.tree.map(jnp.zeros_like, first)
+        first_position = {name: x[:1, ..., :1] for name, x in coordinates.items() if name != "angular_velocity"}
+        shift = jax.tree.map(jnp.zeros_like, first_position)
         if any(solved.angles.angle):  # the angles are counted from the first position, which moves too
-            system, slope, which = _linear(self, (solved.length, None), values, changes, first, moved)
-            changed = _moved(system, slope, which, first, instants[:1])
-            moved = {name: changed[name] for name in first}
-        system, slope, which = _linear(self, (solved.length, solved.angles), values, changes, first, moved)
-        change = _moved(system, slope, which, coordinates, instants)
+            system, slope, indices = _linear(self, (solved.length, None), values, changes, first_position, shift)
+            changed = _moved(system, slope, indices, first_position, instants[:1])
+            shift = {name: changed[name] for name in first_position}
+        system, slope, indices = _linear(self, (solved.length, solved.angles), values, changes, first_position, shift)
+        change = _moved(system, slope, indices, coordinates, instants)
         return {name: _where(regular, c, jnp.zeros_like(c)) for name, c in change.items()}
 
 
@@ -300,12 +300,12 @@ def _builder(mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism]) ->
     If joints are new objects in each call, the builder is not compiled, as this would happen every time.
     """
     numbers = {name: value for name, value in mechanism.parameters.items() if not isinstance(value, Tracer)}
-    plain = tuple((n, x if isinstance(x, str | Expression) else float(x)) for n, x in numbers.items())
+    parameters = tuple((n, x if isinstance(x, str | Expression) else float(x)) for n, x in numbers.items())
     fields = [field.name for field in dataclasses.fields(mechanism) if field.name != "parameters"]
     given = {name: getattr(mechanism, name) for name in fields}
     if holds_tracer(given) or (own := _users_code(mechanism)) is None:
         return _Builder(mechanism, made_of, again=False)
-    key = (made_of, tuple(map(id, given.values())), tuple(mechanism.parameters), plain, own)
+    key = (made_of, tuple(map(id, given.values())), tuple(mechanism.parameters), parameters, own)
     if key not in _builders:
         while len(_builders) >= MOST_BUILDERS:
             _builders.pop(next(iter(_builders)))
@@ -325,7 +325,7 @@ def _where(regular: Any, values: Any, others: Any) -> Any:
 
 
 def _linear(
-    built: _Builder, known: tuple[Any, Angles | None], values: Values, changes: Values, first: Any, moved: Any
+    built: _Builder, known: tuple[Any, Angles | None], values: Values, changes: Values, first: Any, shift: Any
 ) -> tuple[System, list[Any], tuple[int, ...]]:
     """Return the system of a model, the changes of its numbers, and the indices of those that change."""
     indices: list[tuple[int, ...]] = []
@@ -335,22 +335,22 @@ def _linear(
         indices.append(which)
         return made
 
-    primal, slope = jax.jvp(numbers, (values, first), (changes, moved))
+    primal, slope = jax.jvp(numbers, (values, first), (changes, shift))
     system = built.model(primal, indices[0], known[1] is not None).system
     leaves, structure = jax.tree.flatten(system)
     numbered = jax.tree.unflatten(structure, range(len(leaves)))
     numbers_used = jax.tree.leaves(with_fields(numbered, forces=(), outputs=()))  # leaves that residuals need
     changes_at = dict(zip(indices[0], slope, strict=True))
-    moving = [(position, changes_at[k]) for position, k in enumerate(numbers_used) if k in changes_at]
-    bare = with_fields(system, forces=(), outputs=())
-    return bare, [change for _, change in moving], tuple(position for position, _ in moving)
+    changing = [(position, changes_at[k]) for position, k in enumerate(numbers_used) if k in changes_at]
+    motion_system = with_fields(system, forces=(), outputs=())
+    return motion_system, [change for _, change in changing], tuple(position for position, _ in changing)
 
 
 def _moved(
-    system: System, slope: list[Any], which: tuple[int, ...], coordinates: dict[str, Any], instants: Any
+    system: System, slope: list[Any], indices: tuple[int, ...], coordinates: dict[str, Any], instants: Any
 ) -> dict[str, Any]:
     pose_type = PlanarPose if "angle" in coordinates else SpatialPose
-    return _change_along(system, slope, coordinates, instants, pose_type=pose_type, which=which)
+    return _change_along(system, slope, coordinates, instants, pose_type=pose_type, which=indices)
 
 
 @compiled("pose_type", "which")
