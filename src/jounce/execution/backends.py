@@ -51,16 +51,16 @@ def joined(backends: Iterable[str]) -> str:
     return ", ".join(sorted(set(backends)))
 
 
-def warn_of_missing(what: str) -> None:
+def warn_of_missing(feature: str) -> None:
     """Warn, once for each operation and each limit, that XLA computes a program without machine code.
 
     A program that is compiled ahead may not be needed; its warning waits until it is.
     """
-    if what in _warned or is_ahead():
+    if feature in _warned or is_ahead():
         return
-    _warned.add(what)
+    _warned.add(feature)
     message = (
-        f"there is no machine code for {what}: XLA computes what needs it, with the same results in two to fifty times "
-        "the time; another form of the operation, or a lower order of a long program, may have machine code"
+        f"there is no machine code for {feature}: XLA computes what needs it, with the same results in two to fifty "
+        "times the time; another form of the operation, or a lower order of a long program, may have machine code"
     )
     warn_caller(MachineCodeWarning(message))

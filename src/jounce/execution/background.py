@@ -50,9 +50,9 @@ class ByKey:
         if (program := self._programs.get(key, self)) is not self:
             return program
         with self._lock:
-            first = key not in self._made
+            is_first = key not in self._made
             future = self._made.setdefault(key, Future())
-        if first:
+        if is_first:
             try:
                 self._programs[key] = result = make()
             except BaseException as error:

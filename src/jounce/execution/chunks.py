@@ -53,8 +53,8 @@ def in_chunks(
     with Threads(thread_count() if threads is None else threads) as pool:
         parts = list(pool.map(computed, range(0, max(count, 1), width)))
 
-    def whole(*arrays: np.ndarray) -> np.ndarray:
+    def concatenated(*arrays: np.ndarray) -> np.ndarray:
         joined = np.concatenate(arrays, axis)  # a copy, so that users may write to it
         return joined[(slice(None),) * (axis % joined.ndim) + (slice(count),)]
 
-    return jax.tree.map(whole, *parts)
+    return jax.tree.map(concatenated, *parts)

@@ -98,8 +98,8 @@ class ByXla:
         check_process()
         leaves = jax.tree.leaves((arguments, keywords))
         traced = [leaf for leaf in leaves if isinstance(leaf, Tracer)] if has_tracers(leaves) else []
-        whole = self.jitted if all(map(runs_at_once, traced)) else self._within
-        return whole(*arguments, **keywords)
+        call = self.jitted if all(map(runs_at_once, traced)) else self._within
+        return call(*arguments, **keywords)
 
 
 class Compiled:
@@ -171,6 +171,6 @@ class Compiled:
         return self.machine_code.program((arrays, tree), ((), _NOTHING), static, large=LARGE)
 
 
-def compiled(*static: str, **how: Any) -> Callable[[Callable[..., Any]], Compiled]:
+def compiled(*static: str, **options: Any) -> Callable[[Callable[..., Any]], Compiled]:
     """Return a decorator that compiles a function at its first call; see `Compiled`."""
-    return lambda function: Compiled(function, static, **how)
+    return lambda function: Compiled(function, static, **options)

@@ -161,13 +161,13 @@ class OnXla:
         """Return the runner of rounds, as for `OnLlvm`; the output arrays are written when all rounds are solved."""
         linked, own, held = map(jax.tree.leaves, lanes)
         stored = jax.tree.leaves(results, is_leaf=lambda x: x is None)
-        recorded = tuple(k for k, whole in enumerate(stored) if whole is not None or k in links)
-        wholes, known = [stored[k] for k in recorded], linked[0].shape[-1]
+        recorded = tuple(k for k, array in enumerate(stored) if array is not None or k in links)
+        outputs, source_count = [stored[k] for k in recorded], linked[0].shape[-1]
         positions = tuple(recorded.index(k) for k in links)
 
         def run(targets: Int[np.ndarray, "round lane"]) -> None:
             order, total = targets.ravel(), self.width * _power(len(targets))
-            index = np.full(known, -1)
+            index = np.full(source_count, -1)
             if stored[links[0]] is linked[0]:
                 index[order[::-1]] = np.arange(len(order))[::-1]
             source = sources[order]
@@ -180,9 +180,9 @@ class OnXla:
             order_of_rounds = padded(source, total), np.asarray(len(targets))
             how = positions, recorded, self.width, self.form, self.how
             result = self.mapped.in_rounds(self.shared, starts, (given, held), order_of_rounds, how=how)
-            for whole, part in zip(wholes, result, strict=True):
-                if whole is not None:
-                    whole[..., order] = np.asarray(part)[..., : len(order)]
+            for array, part in zip(outputs, result, strict=True):
+                if array is not None:
+                    array[..., order] = np.asarray(part)[..., : len(order)]
 
         return run
 
@@ -270,9 +270,9 @@ class Mapped:
             Further arguments of the function.
         """
         leaves, structure = jax.tree.flatten(shared)
-        few, form = jax.tree.flatten(lanes)
-        if not has_tracers([*leaves, *few]):
-            arrays, parts = all_shaped(leaves), all_shaped(few)
+        lane_leaves, form = jax.tree.flatten(lanes)
+        if not has_tracers([*leaves, *lane_leaves]):
+            arrays, parts = all_shaped(leaves), all_shaped(lane_leaves)
             code = self.machine_code.program((arrays, structure), (parts, form), static, large=large)
             if code is not None:
                 return OnLlvm(code, arrays)
@@ -302,15 +302,15 @@ class Mapped:
         **static
             Further arguments of the function.
         """
-        few = count <= FEWEST_TOGETHER
-        lanes = lanes_of(np.arange(count if few else 1))
+        is_small = count <= FEWEST_TOGETHER
+        lanes = lanes_of(np.arange(count if is_small else 1))
         program = self.program(shared, lanes, large=large, **static)
         if program.backend != LLVM and is_traced((shared, lanes)):
             return self.on_xla(shared, lanes_of(np.arange(count)), how=tuple(static.items())), xla_backend()
-        if few:
+        if is_small:
             return program(lanes), program.backend
         widths = program.together(sum(np.size(x) for x in jax.tree.leaves(lanes)))
-        return in_chunks(lambda some: program(lanes_of(some)), count, widths, filled=False), program.backend
+        return in_chunks(lambda indices: program(lanes_of(indices)), count, widths, filled=False), program.backend
 
     def along(self, shared: Any, lanes: Any, *, large: int = LARGE, **static: Any) -> Any:
         """Return the results for all instants of arrays along their last axis, as `at_instants` does."""
@@ -346,22 +346,22 @@ class Mapped:
         total = len(sources)
 
         def solved(linked: Sequence[Any], own: Sequence[Any]) -> list[Any]:
-            same = [jnp.broadcast_to(jnp.asarray(x), (*x.shape[:-1], width)) for x in held]
-            given = jax.tree.unflatten(form, [*linked, *own, *same])
+            repeated = [jnp.broadcast_to(jnp.asarray(x), (*x.shape[:-1], width)) for x in held]
+            given = jax.tree.unflatten(form, [*linked, *own, *repeated])
             result = jax.tree.leaves(self._many(shared, given, **dict(static)))
             return [result[k] for k in recorded]
 
-        def some(x: Any, turn: Any) -> Any:
+        def round_part(x: Any, turn: Any) -> Any:
             return jax.lax.dynamic_slice_in_dim(x, turn * width, width, axis=-1)
 
         def go_on(turn: Any, stored: list[Any]) -> list[Any]:
-            source = some(sources, turn)
-            parts = solved([jnp.take(stored[k], source, axis=-1) for k in links], [some(x, turn) for x in own])
+            source = round_part(sources, turn)
+            parts = solved([jnp.take(stored[k], source, axis=-1) for k in links], [round_part(x, turn) for x in own])
             put = jax.lax.dynamic_update_slice_in_dim
-            return [put(whole, part, turn * width, -1) for whole, part in zip(stored, parts, strict=True)]
+            return [put(array, part, turn * width, -1) for array, part in zip(stored, parts, strict=True)]
 
-        one = [[jax.ShapeDtypeStruct((*x.shape[:-1], width), x.dtype) for x in group] for group in (starts, own)]
-        shapes = jax.eval_shape(solved, *one)
+        examples = [[jax.ShapeDtypeStruct((*x.shape[:-1], width), x.dtype) for x in group] for group in (starts, own)]
+        shapes = jax.eval_shape(solved, *examples)
         stored = [jnp.zeros((*x.shape[:-1], total), x.dtype) for x in shapes]
         for k, start in zip(links, starts, strict=True):
             stored[k] = jnp.concatenate([stored[k], start], axis=-1)
@@ -369,6 +369,6 @@ class Mapped:
         return [x[..., :total] for x in result]
 
 
-def mapped(**how: Any) -> Callable[[Callable[..., Any]], Mapped]:
+def mapped(**options: Any) -> Callable[[Callable[..., Any]], Mapped]:
     """Return a decorator that makes a function `Mapped`."""
-    return lambda function: Mapped(function, **how)
+    return lambda function: Mapped(function, **options)

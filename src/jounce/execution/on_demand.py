@@ -71,8 +71,8 @@ def read_only_arrays(arrays: dict[str, Any]) -> dict[str, Any]:
 
 
 def _of_values(names: tuple[str, ...], values: Iterable[Any]) -> OnDemand:
-    known = dict(zip(names, values, strict=True))
-    return OnDemand(names, lambda _: known)
+    by_name = dict(zip(names, values, strict=True))
+    return OnDemand(names, lambda _: by_name)
 
 
 jax.tree_util.register_pytree_node(OnDemand, lambda tree: (tuple(tree.values()), tuple(tree)), _of_values)

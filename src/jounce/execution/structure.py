@@ -74,16 +74,16 @@ def _several(values: Any) -> str:
     return ", ".join(map(description, values))
 
 
-def _own(thing: type | types.FunctionType) -> str:
+def _own(definition: type | types.FunctionType) -> str:
     """Return the qualified name of a class or function of this package."""
-    result: Any = sys.modules.get(thing.__module__)
+    result: Any = sys.modules.get(definition.__module__)
     origin = getattr(getattr(result, "__spec__", None), "origin", None)
     inside = origin is not None and Path(origin).is_relative_to(PACKAGE)
-    for part in thing.__qualname__.split("."):
+    for part in definition.__qualname__.split("."):
         result = getattr(result, part, None)
-    if not inside or thing not in (result, getattr(result, "__wrapped__", None)):  # or wrapped by a decorator
-        raise UndescribedError(f"{thing.__module__}.{thing.__qualname__}")
-    return f"{thing.__module__}.{thing.__qualname__}"
+    if not inside or definition not in (result, getattr(result, "__wrapped__", None)):  # or wrapped by a decorator
+        raise UndescribedError(f"{definition.__module__}.{definition.__qualname__}")
+    return f"{definition.__module__}.{definition.__qualname__}"
 
 
 def tree_description(tree: Any) -> str:
@@ -123,8 +123,8 @@ def cache_key(
     UndescribedError
         If the structure contains user code, or this package in memory differs from its files.
     """
-    if (changed := altered() or _changed_file()) is not None:
-        raise UndescribedError(changed)
+    if (alteration := altered() or _changed_file()) is not None:
+        raise UndescribedError(alteration)
     parts = [
         description(functions),
         tree_description(tree),

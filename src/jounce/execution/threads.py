@@ -99,10 +99,10 @@ class Threads:
             return
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self.count, thread_name_prefix="jounce")
-        waiting, called = deque[Future[Result]](), in_callers_context(function)
+        pending, worker = deque[Future[Result]](), in_callers_context(function)
         for item in items:
-            waiting.append(self._pool.submit(called, item))
-            if len(waiting) > AHEAD * self.count:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+            pending.append(self._pool.submit(worker, item))
+            if len(pending) > AHEAD * self.count:
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()

@@ -108,23 +108,23 @@ class Translated:
         """
         if not uses_machine_code():
             return None
-        (arrays, structure), (few, form) = shared, lanes
+        (arrays, structure), (examples, form) = shared, lanes
         kinds = tuple([(x.shape, x.dtype) for x in arrays])
-        ones = tuple([(self._one(x.shape), x.dtype) for x in few])
+        lane_kinds = tuple([(self._one(x.shape), x.dtype) for x in examples])
         found_later = [name for name, value in static.items() if type(value) is WhenMade]
-        matters, hasty = found_later or not self._single, is_in_haste()
-        others = [(k, x) for k, x in enumerate(arrays) if x.dtype is not FLOAT] if matters else ()
+        is_keyed, hasty = found_later or not self._single, is_in_haste()
+        others = [(k, x) for k, x in enumerate(arrays) if x.dtype is not FLOAT] if is_keyed else ()
         indices: Any = {k: x for k, x in others if x.dtype.kind in "iu" and x.ndim}
-        known = tuple([x.tobytes() for x in indices.values()])
+        values = tuple([x.tobytes() for x in indices.values()])
         static_key = tuple([(name, type(value), value) for name, value in static.items()])
-        key = structure, form, kinds, ones, known, large, hasty, static_key, settings()
+        key = structure, form, kinds, lane_kinds, values, large, hasty, static_key, settings()
 
         def make() -> Any:
             late = {name: static[name].find() for name in found_later}
             if None in late.values():
                 return None
-            parts = zip((structure, form), (kinds, ones), strict=True)
-            given = [jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(*x) for x in its]) for tree, its in parts]
+            parts = zip((structure, form), (kinds, lane_kinds), strict=True)
+            given = [jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(*x) for x in group]) for tree, group in parts]
             constant = {} if self._single else indices
             return self._made((given[0], given[1]), constant, {"large": large, "hasty": hasty}, {**static, **late})
 

@@ -13,6 +13,6 @@ def clusters(joined: Bool[np.ndarray, "member member"]) -> list[list[int]]:
     [[0, 2], [1]]
     """
     reached = joined | np.eye(len(joined), dtype=bool)
-    while ((further := reached @ reached) != reached).any():
-        reached = further
+    while ((extended := reached @ reached) != reached).any():
+        reached = extended
     return [np.flatnonzero(row).tolist() for k, row in enumerate(reached) if row.argmax() == k]

@@ -21,15 +21,15 @@ def elimination_order(touched: tuple[frozenset[int], ...], body_count: int, widt
         Number of bodies, and of columns per body.
     """
     best = list(reversed(range(body_count)))  # driven bodies late: their rows touch few bodies
-    least, improved = _operations(best, touched, width), True
+    fewest, improved = _operations(best, touched, width), True
     while improved:
         improved = False
         for body in range(body_count):
             others = [other for other in best if other != body]
             for place in range(body_count):
                 tried = [*others[:place], body, *others[place:]]
-                if (operations := _operations(tried, touched, width)) < least:
-                    best, least, improved = tried, operations, True
+                if (operations := _operations(tried, touched, width)) < fewest:
+                    best, fewest, improved = tried, operations, True
     masks = _masks(best, touched)
     rows = tuple(sorted(range(len(touched)), key=lambda row: _ends(masks[row])))
     return rows, tuple(width * body + k for body in best for k in range(width))
@@ -38,7 +38,7 @@ def elimination_order(touched: tuple[frozenset[int], ...], body_count: int, widt
 def _masks(bodies: Sequence[int], touched: Sequence[frozenset[int]]) -> list[int]:
     """Return the bodies that rows touch as bit masks, in the order of their elimination."""
     bits = {body: 1 << k for k, body in enumerate(bodies)}
-    return [sum(bits[body] for body in some) for some in touched]
+    return [sum(bits[body] for body in members) for members in touched]
 
 
 def _ends(mask: int) -> tuple[int, int]:

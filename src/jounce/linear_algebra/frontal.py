@@ -38,11 +38,11 @@ class FrontalFactor(Module):
         scale = jnp.concatenate([scale, jnp.zeros((1, 1))])
 
         def step(left: Any, plan: Any) -> Any:
-            front, own, rights, rows, taken = plan
-            known = left.reshape(count * (height - width), columns - width, lanes)
-            inherited = known.at[rows[:, None], taken].get(mode="fill", fill_value=0.0)
-            *factors, rest = _eliminated(entries[own] * scale[rights][:, :, None] + inherited, width)
-            return _put(left, rest, front), tuple(factors)
+            front, indices, rights, rows, taken = plan
+            previous = left.reshape(count * (height - width), columns - width, lanes)
+            inherited = previous.at[rows[:, None], taken].get(mode="fill", fill_value=0.0)
+            *factors, remainder = _eliminated(entries[indices] * scale[rights][:, :, None] + inherited, width)
+            return _put(left, remainder, front), tuple(factors)
 
         left = jnp.zeros((count, height - width, columns - width, lanes))
         plans = (np.arange(count), fronts.entries, fronts.rights, fronts.left_rows, fronts.left_columns)
@@ -68,26 +68,26 @@ class FrontalFactor(Module):
         right = jnp.concatenate([right, jnp.zeros((1, lanes))])
 
         def forward(left: Any, level: Any) -> Any:
-            front, own, rows, vectors, factors = level
-            y = right[own] + left.reshape(-1, lanes).at[rows].get(mode="fill", fill_value=0.0)
+            front, indices, rows, vectors, factors = level
+            y = right[indices] + left.reshape(-1, lanes).at[rows].get(mode="fill", fill_value=0.0)
             y = _reflected(y, zip(vectors, factors, strict=True))
             return _put(left, y[width:], front), y[:width]
 
-        def backward(known: Any, level: Any) -> Any:
+        def backward(solution: Any, level: Any) -> Any:
             front, neighbors, triangle, inverted, y = level
-            y = y - jnp.sum(triangle[:, width:] * known[neighbors].reshape(1, columns - width, lanes), axis=1)
+            y = y - jnp.sum(triangle[:, width:] * solution[neighbors].reshape(1, columns - width, lanes), axis=1)
             x: list[Any] = [None] * width
             for i in reversed(range(width)):
                 x[i] = (y[i] - sum(triangle[i, j] * x[j] for j in range(i + 1, width))) * inverted[i]
-            return _put(known, jnp.stack(x), front), None
+            return _put(solution, jnp.stack(x), front), None
 
         count = np.arange(len(plan.entries))
         left = jnp.zeros((len(count), height - width, lanes))
         _, y = jax.lax.scan(forward, left, (count, plan.rights, plan.left_rows, self.vectors, self.factors))
-        known = jnp.zeros((len(count) + 1, width, lanes))
+        solution = jnp.zeros((len(count) + 1, width, lanes))
         levels = (count, plan.neighbors, self.triangle, self.inverted, y)
-        known, _ = jax.lax.scan(backward, known, levels, reverse=True)
-        return known[plan.of_body].reshape(-1, lanes)
+        solution, _ = jax.lax.scan(backward, solution, levels, reverse=True)
+        return solution[plan.of_body].reshape(-1, lanes)
 
     def solve_transposed(self, right: Float[Numbers, "column batch"]) -> Columns:
         """Return the solutions of the transposed systems, shape (rows, batch), of least norm if underdetermined."""
@@ -97,26 +97,26 @@ class FrontalFactor(Module):
         blocks = jnp.asarray(right).reshape(len(count), width, lanes)
         order = jnp.zeros_like(plan.of_body).at[plan.of_body].set(count.astype(np.int32))  # body of each front
 
-        def forward(owed: Any, level: Any) -> Any:
+        def forward(contributions: Any, level: Any) -> Any:
             front, neighbors, body, triangle, inverted = level
-            w = blocks[body] - owed[front]
+            w = blocks[body] - contributions[front]
             u: list[Any] = []
             for i in range(width):
                 u.append((w[i] - sum(triangle[j, i] * u[j] for j in range(i))) * inverted[i])
             solved = jnp.stack(u)
-            share = jnp.sum(triangle[:, width:] * solved[:, None], axis=0).reshape(-1, width, lanes)
-            return owed.at[neighbors].add(share, mode="drop"), solved
+            update = jnp.sum(triangle[:, width:] * solved[:, None], axis=0).reshape(-1, width, lanes)
+            return contributions.at[neighbors].add(update, mode="drop"), solved
 
-        owed = jnp.zeros((len(count), width, lanes))
-        _, u = jax.lax.scan(forward, owed, (count, plan.neighbors, order, self.triangle, self.inverted))
+        contributions = jnp.zeros((len(count), width, lanes))
+        _, u = jax.lax.scan(forward, contributions, (count, plan.neighbors, order, self.triangle, self.inverted))
 
         def backward(carry: Any, level: Any) -> Any:
             left, solution = carry
-            front, own, rows, vectors, factors, top = level
+            front, indices, rows, vectors, factors, top = level
             y = jnp.concatenate([top, left[front]])
             y = _reflected(y, zip(vectors[::-1], factors[::-1], strict=True))
             flat = left.reshape(-1, lanes).at[rows].set(y, mode="drop")
-            return (flat.reshape(left.shape), solution.at[own].set(y, mode="drop")), None
+            return (flat.reshape(left.shape), solution.at[indices].set(y, mode="drop")), None
 
         blank = jnp.zeros((len(count), height - width, lanes)), jnp.zeros((plan.row_count, lanes))
         levels = (count, plan.rights, plan.left_rows, self.vectors, self.factors, u)
@@ -139,8 +139,8 @@ class FrontalFactor(Module):
         return jnp.prod(jnp.sign(jnp.where(jnp.isinf(self.inverted), 0.0, self.inverted)), axis=(0, 1))
 
 
-def _put(whole: Any, part: Any, index: Any) -> Any:
-    return jax.lax.dynamic_update_index_in_dim(whole, part, index, 0)
+def _put(array: Any, part: Any, index: Any) -> Any:
+    return jax.lax.dynamic_update_index_in_dim(array, part, index, 0)
 
 
 def _reflected(y: Any, reflections: Any) -> Any:
@@ -158,12 +158,12 @@ def _eliminated(front: Any, width: int) -> tuple[Any, Any, Any, Any, Any]:
     vectors, factors, rows, inverted = [], [], [], []
     for k in range(width):
         vector, pivot, factor = reflection(front[:, 0])
-        along = jnp.sum(vector[:, None] * front[:, 1:], axis=0, keepdims=True)
-        rest = front[:, 1:] - vector[:, None] * (factor[None, None] * along)
-        above = jnp.zeros((k, *pivot.shape))
-        vectors.append(jnp.concatenate([above, vector]))
+        products = jnp.sum(vector[:, None] * front[:, 1:], axis=0, keepdims=True)
+        remainder = front[:, 1:] - vector[:, None] * (factor[None, None] * products)
+        padding = jnp.zeros((k, *pivot.shape))
+        vectors.append(jnp.concatenate([padding, vector]))
         factors.append(factor)
-        rows.append(jnp.concatenate([above, pivot[None], rest[0]]))
+        rows.append(jnp.concatenate([padding, pivot[None], remainder[0]]))
         inverted.append(1.0 / pivot)
-        front = jax.lax.optimization_barrier(rest[1:])
+        front = jax.lax.optimization_barrier(remainder[1:])
     return jnp.stack(vectors), jnp.stack(factors), jnp.stack(rows), jnp.stack(inverted), front

@@ -46,23 +46,25 @@ class InversePlan(Module):
     def of(cls, fronts: Fronts) -> "InversePlan":
         """Plan products from fronts with NumPy arrays; row and column of equal number belong together."""
         (count, height, columns), width, size = fronts.shape, fronts.width, fronts.row_count
-        left_height, nothing = height - width, count * height * columns
+        left_height, unused = height - width, count * height * columns
         inherited = fronts.left_rows < count * left_height
         sources = np.where(inherited, size + 1 + fronts.left_rows, fronts.rights).astype(np.int32)
-        needed = np.concatenate([np.arange(count)[:, None], fronts.neighbors], axis=1)  # bodies of each block
-        responses = np.full((count, columns - width, left_height), nothing, np.int32)
-        for front, at in np.argwhere(inherited).tolist():
-            child, row = divmod(int(fronts.left_rows[front, at]), left_height)
+        bodies = np.concatenate([np.arange(count)[:, None], fronts.neighbors], axis=1)  # bodies of each block
+        responses = np.full((count, columns - width, left_height), unused, np.int32)
+        for front, line in np.argwhere(inherited).tolist():
+            child, row = divmod(int(fronts.left_rows[front, line]), left_height)
             for slot, body in enumerate(fronts.neighbors[child].tolist()):
                 if body < count:
-                    column = int(np.flatnonzero(needed[front] == body)[0]) * width + np.arange(width)
-                    responses[child, slot * width : (slot + 1) * width, row] = (front * columns + column) * height + at
-        diagonal = np.full(size, nothing, np.int32)
-        for front, at in np.argwhere(fronts.rights < size).tolist():
-            row = int(fronts.rights[front, at])
+                    column = int(np.flatnonzero(bodies[front] == body)[0]) * width + np.arange(width)
+                    responses[child, slot * width : (slot + 1) * width, row] = (
+                        front * columns + column
+                    ) * height + line
+        diagonal = np.full(size, unused, np.int32)
+        for front, line in np.argwhere(fronts.rights < size).tolist():
+            row = int(fronts.rights[front, line])
             body, offset = divmod(row, width)
-            column = int(np.flatnonzero(needed[front] == fronts.of_body[body])[0]) * width + offset
-            diagonal[row] = (front * columns + column) * height + at
+            column = int(np.flatnonzero(bodies[front] == fronts.of_body[body])[0]) * width + offset
+            diagonal[row] = (front * columns + column) * height + line
         return cls(fronts, sources, responses, diagonal)
 
 
@@ -88,21 +90,21 @@ class FrontalInverse(Module):
         """Assemble the maps of factored matrices, all fronts side by side."""
         (count, height, _), width = plan.fronts.shape, plan.fronts.width
         lanes = factor.inverted.shape[-1]
-        turned = jnp.broadcast_to(np.eye(height)[None, :, :, None], (count, height, height, lanes))
+        rotation = jnp.broadcast_to(np.eye(height)[None, :, :, None], (count, height, height, lanes))
         for i in range(width):
             vector = factor.vectors[:, i, :, None]
-            along = jnp.sum(vector * turned, axis=1, keepdims=True)
-            turned = jax.lax.optimization_barrier(turned - vector * (factor.factors[:, i, None, None] * along))
-        right = jnp.concatenate([turned[:, :width], factor.triangle[:, :, width:]], axis=2)
+            products = jnp.sum(vector * rotation, axis=1, keepdims=True)
+            rotation = jax.lax.optimization_barrier(rotation - vector * (factor.factors[:, i, None, None] * products))
+        right = jnp.concatenate([rotation[:, :width], factor.triangle[:, :, width:]], axis=2)
         rows: list[Any] = [None] * width
         for i in reversed(range(width)):
             row = right[:, i]
             for j in range(i + 1, width):
                 row = row - factor.triangle[:, i, j, None] * rows[j]
             rows[i] = jax.lax.optimization_barrier(row * factor.inverted[:, i, None])
-        known = jnp.stack(rows, axis=2)
-        inward = jnp.concatenate([known[:, :height], jnp.swapaxes(turned[:, width:], 1, 2)], axis=2)
-        return cls(plan, inward, known[:, height:])
+        inverse = jnp.stack(rows, axis=2)
+        inward = jnp.concatenate([inverse[:, :height], jnp.swapaxes(rotation[:, width:], 1, 2)], axis=2)
+        return cls(plan, inward, inverse[:, height:])
 
     def solve(self, right: Columns) -> Float[Numbers, "column batch"]:
         """Return the solutions, shape (columns, batch), for right-hand sides of shape (rows, batch)."""
@@ -110,27 +112,27 @@ class FrontalInverse(Module):
         (count, height, _), numbers = plan.fronts.shape, np.arange(plan.fronts.shape[0])
         size, left = len(right), height - width
 
-        def inwards(known: Any, level: Any) -> tuple[Any, Any]:
+        def inwards(values: Any, level: Any) -> tuple[Any, Any]:
             front, sources, inward = level
-            y = known.at[sources].get(mode="promise_in_bounds")
+            y = values.at[sources].get(mode="promise_in_bounds")
             updates = total(inward[j] * y[j][None] for j in range(height))
-            return jax.lax.dynamic_update_slice_in_dim(known, updates[width:], size + 1 + front * left, 0), updates[
+            return jax.lax.dynamic_update_slice_in_dim(values, updates[width:], size + 1 + front * left, 0), updates[
                 :width
             ]
 
-        known = jnp.concatenate([right, jnp.zeros((1 + count * left, lanes))])
-        _, partial = jax.lax.scan(inwards, known, (numbers, plan.sources, self.inward))
+        values = jnp.concatenate([right, jnp.zeros((1 + count * left, lanes))])
+        _, partial = jax.lax.scan(inwards, values, (numbers, plan.sources, self.inward))
 
-        def outwards(known: Any, level: Any) -> tuple[Any, None]:
-            front, neighbors, outward, own = level
-            at_neighbors = known.at[neighbors].get(mode="promise_in_bounds").reshape(-1, lanes)
-            own = own - total(outward[j] * at_neighbors[j][None] for j in range(len(outward)))
-            return jax.lax.dynamic_update_index_in_dim(known, own, front, 0), None
+        def outwards(values: Any, level: Any) -> tuple[Any, None]:
+            front, neighbors, outward, block = level
+            at_neighbors = values.at[neighbors].get(mode="promise_in_bounds").reshape(-1, lanes)
+            block = block - total(outward[j] * at_neighbors[j][None] for j in range(len(outward)))
+            return jax.lax.dynamic_update_index_in_dim(values, block, front, 0), None
 
-        known = jnp.zeros((count + 1, width, lanes))
+        values = jnp.zeros((count + 1, width, lanes))
         levels = (numbers, plan.fronts.neighbors, self.outward, partial)
-        known, _ = jax.lax.scan(outwards, known, levels, reverse=True)
-        return known[plan.fronts.of_body].reshape(-1, lanes)
+        values, _ = jax.lax.scan(outwards, values, levels, reverse=True)
+        return values[plan.fronts.of_body].reshape(-1, lanes)
 
     def diagonal(self) -> Float[Numbers, "row batch"]:
         """Return the diagonals of the inverses, computed from the blocks of the fronts only."""
@@ -138,16 +140,16 @@ class FrontalInverse(Module):
         count, height, columns = plan.fronts.shape
         size = height * columns
 
-        def step(known: Any, level: Any) -> tuple[Any, None]:
+        def step(blocks: Any, level: Any) -> tuple[Any, None]:
             front, responses, inward, outward = level
-            at_neighbors = known.at[responses].get(mode="promise_in_bounds")  # responses to left-over rows
+            at_neighbors = blocks.at[responses].get(mode="promise_in_bounds")  # responses to left-over rows
             given = inward[:, width:]
-            others = total(at_neighbors[:, k, None] * given[None, :, k] for k in range(height - width))
-            own = jnp.swapaxes(inward[:, :width], 0, 1)
-            own = own - total(outward[j][:, None] * others[j][None] for j in range(columns - width))
-            block = jnp.concatenate([own, others]).reshape(size, lanes)
-            return jax.lax.dynamic_update_slice_in_dim(known, block, front * size, 0), None
+            coupled = total(at_neighbors[:, k, None] * given[None, :, k] for k in range(height - width))
+            square = jnp.swapaxes(inward[:, :width], 0, 1)
+            square = square - total(outward[j][:, None] * coupled[j][None] for j in range(columns - width))
+            block = jnp.concatenate([square, coupled]).reshape(size, lanes)
+            return jax.lax.dynamic_update_slice_in_dim(blocks, block, front * size, 0), None
 
         levels = (np.arange(count), plan.responses, self.inward, self.outward)
-        known, _ = jax.lax.scan(step, jnp.zeros((count * size + 1, lanes)), levels, reverse=True)
-        return known[plan.diagonal]
+        blocks, _ = jax.lax.scan(step, jnp.zeros((count * size + 1, lanes)), levels, reverse=True)
+        return blocks[plan.diagonal]

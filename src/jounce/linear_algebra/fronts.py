@@ -66,9 +66,9 @@ class Fronts(Module):
         """Plan the elimination of matrices of a pattern with NumPy arrays."""
         bodies, indices, count, width = pattern.bodies, pattern.entry_indices, pattern.body_count, pattern.width
         entry_count = pattern.entry_count
-        order, separators, held = _ordered(pattern)
+        order, separators, front_rows = _ordered(pattern)
         position = np.argsort(order)
-        height = max(width + 1, *map(len, held))  # avoids empty arrays
+        height = max(width + 1, *map(len, front_rows))  # avoids empty arrays
         most_neighbors = max(1, *map(len, separators))
         columns, left_height = width * (1 + most_neighbors), height - width
         entries = np.full((count, height, columns), entry_count, np.int32)
@@ -77,21 +77,21 @@ class Fronts(Module):
         left_columns = np.full((count, height, columns), width * most_neighbors, np.int32)
         neighbors = np.full((count, most_neighbors), count, np.int32)
         ordered = [sorted(position[list(s)]) if s else [] for s in separators]
-        for front, members in enumerate(held):
+        for front, members in enumerate(front_rows):
             neighbors[front, : len(ordered[front])] = ordered[front]
             block = {p: k for k, p in enumerate([front, *ordered[front]])}
-            for at, (source, row) in enumerate(members):
+            for line, (source, row) in enumerate(members):
                 if source < 0:
-                    rights[front, at] = row
+                    rights[front, line] = row
                     for slot, body in enumerate(bodies[row]):
                         if body < count:
                             first = block[position[body]] * width
-                            entries[front, at, first : first + width] = indices[row, slot]
+                            entries[front, line, first : first + width] = indices[row, slot]
                 else:
-                    left_rows[front, at] = source * left_height + row
+                    left_rows[front, line] = source * left_height + row
                     for k, p in enumerate(ordered[source]):
                         first = block[p] * width
-                        left_columns[front, at, first : first + width] = k * width + np.arange(width)
+                        left_columns[front, line, first : first + width] = k * width + np.arange(width)
         return cls(entries, rights, left_rows, left_columns, neighbors, position.astype(np.int32), len(bodies), width)
 
 
@@ -108,27 +108,27 @@ def _ordered(pattern: Pattern) -> tuple[Int[np.ndarray, " body"], list[set[int]]
         for body in touched:
             adjacent[body] |= touched - {body}
             rows[body].add((-1, row))
-    waiting = [(len(adjacent[body]), len(rows[body]), body) for body in range(count)]
-    heapq.heapify(waiting)
+    queue = [(len(adjacent[body]), len(rows[body]), body) for body in range(count)]
+    heapq.heapify(queue)
     order: list[int] = []
-    separators, held, done = [], [], np.zeros(count, bool)
-    while waiting:
-        *key, body = heapq.heappop(waiting)
-        if done[body] or key != [len(adjacent[body]), len(rows[body])]:
+    separators, front_rows, is_eliminated = [], [], np.zeros(count, bool)
+    while queue:
+        *key, body = heapq.heappop(queue)
+        if is_eliminated[body] or key != [len(adjacent[body]), len(rows[body])]:
             continue  # an outdated entry; the body was queued again
-        done[body] = True
-        around, mine = adjacent[body], sorted(rows[body])
-        left = {(len(order), k) for k in range(len(mine) - width)}
+        is_eliminated[body] = True
+        neighbors, members = adjacent[body], sorted(rows[body])
+        remaining = {(len(order), k) for k in range(len(members) - width)}
         order.append(body)
-        separators.append(set(around))
-        held.append(mine)
-        for other in around:
-            adjacent[other] |= around
+        separators.append(set(neighbors))
+        front_rows.append(members)
+        for other in neighbors:
+            adjacent[other] |= neighbors
             adjacent[other] -= {other, body}
             rows[other] -= rows[body]
-            rows[other] |= left
-            heapq.heappush(waiting, (len(adjacent[other]), len(rows[other]), other))
-    return np.array(order, int), separators, held
+            rows[other] |= remaining
+            heapq.heappush(queue, (len(adjacent[other]), len(rows[other]), other))
+    return np.array(order, int), separators, front_rows
 
 
 def elimination(pattern: Pattern) -> Fronts | None:
@@ -137,5 +137,5 @@ def elimination(pattern: Pattern) -> Fronts | None:
     if rows < columns or not rows or (rows > columns and columns <= MOST_DENSE):
         return None
     fronts = Fronts.of(pattern)
-    count, height, wide = fronts.shape
-    return fronts if FRONT_COST * count * pattern.width * height * wide < rows**3 else None
+    count, height, front_columns = fronts.shape
+    return fronts if FRONT_COST * count * pattern.width * height * front_columns < rows**3 else None

@@ -93,8 +93,8 @@ class HostJacobian:
         width = self.blocks.shape[-1]
         columns = self.bodies[:, :, None] * width + np.arange(width)
         row, slot, column = np.nonzero((self.blocks != 0) & (columns < self.shape[1]))
-        where = row, columns[row, slot, column]
-        return coo_array((self.blocks[row, slot, column], where), shape=self.shape).tocsr()
+        positions = row, columns[row, slot, column]
+        return coo_array((self.blocks[row, slot, column], positions), shape=self.shape).tocsr()
 
     def step(self, residual: Float[np.ndarray, " row"]) -> Float[np.ndarray, " column"] | None:
         """Return the shortest step that closes the residual to first order, rows scaled; None if it is not finite."""
@@ -133,18 +133,18 @@ class HostJacobian:
         if self._is_regular:
             return np.zeros((rows, 0)), np.zeros(0), np.zeros((columns, 0))
         if not self.is_large:
-            few = self._sizes <= SMALL * self.largest
-            if not few.any():
+            is_small = self._sizes <= SMALL * self.largest
+            if not is_small.any():
                 return np.zeros((rows, 0)), np.zeros(0), np.zeros((columns, 0))
             left, sizes, right = self._singular
-            return left[:, : len(few)][:, few], sizes[few], right[: len(few)][few].T
+            return left[:, : len(is_small)][:, is_small], sizes[is_small], right[: len(is_small)][is_small].T
         if not min(self.shape):
             return np.zeros((rows, 0)), np.zeros(0), np.zeros((columns, 0))
         matrix = self.sparse() if rows > columns else self.sparse().T.tocsr()
         vectors = _null_space(matrix, tolerance=SMALL)
-        others, sizes, turned = np.linalg.svd(matrix @ vectors, full_matrices=False)
-        vectors = vectors @ turned.T
-        return (others, sizes, vectors) if rows > columns else (vectors, sizes, others)
+        images, sizes, rotation = np.linalg.svd(matrix @ vectors, full_matrices=False)
+        vectors = vectors @ rotation.T
+        return (images, sizes, vectors) if rows > columns else (vectors, sizes, images)
 
     @cached_property
     def dependences(self) -> Float[np.ndarray, "row combination"]:
@@ -205,10 +205,10 @@ def _augmented(matrix: Any, damping: float) -> Any:
 
     (rows, columns), entries = matrix.shape, matrix.tocoo()
     size = rows + columns
-    below, diagonal = columns + entries.row, np.arange(size if damping else columns, dtype=entries.row.dtype)
+    lower_rows, diagonal = columns + entries.row, np.arange(size if damping else columns, dtype=entries.row.dtype)
     values = np.concatenate([entries.data, entries.data, np.where(diagonal < columns, 1.0, -damping)])
-    where = [below, entries.col, diagonal], [entries.col, below, diagonal]
-    return coo_array((values, tuple(map(np.concatenate, where))), shape=(size, size))
+    positions = [lower_rows, entries.col, diagonal], [entries.col, lower_rows, diagonal]
+    return coo_array((values, tuple(map(np.concatenate, positions))), shape=(size, size))
 
 
 def _shortest(matrix: Any, right: Float[np.ndarray, " row"]) -> Float[np.ndarray, " column"]:
@@ -252,9 +252,9 @@ def is_clearly_regular(matrix: Float[np.ndarray, "size size"], tolerance: float)
     if not np.isfinite(matrix).all():
         return False
     nonzero = np.flatnonzero(matrix != 0.0)  # ten times as fast as SciPy's search
-    where = np.divmod(nonzero.astype(np.int32), np.int32(len(matrix)))
-    whole = csr_array((matrix.ravel()[nonzero], where), shape=matrix.shape)
-    return _solved(whole, np.zeros((len(matrix), 0)))[1] > 10 * tolerance * _largest_size(whole)
+    positions = np.divmod(nonzero.astype(np.int32), np.int32(len(matrix)))
+    sparse_matrix = csr_array((matrix.ravel()[nonzero], positions), shape=matrix.shape)
+    return _solved(sparse_matrix, np.zeros((len(matrix), 0)))[1] > 10 * tolerance * _largest_size(sparse_matrix)
 
 
 def _has_short_inverse(matrix: Float[np.ndarray, "size size"], tolerance: float) -> bool:
@@ -271,8 +271,8 @@ def _clearly_independent(matrix: Any, tolerance: float) -> bool:
     """Return whether no combination of rows vanishes, by a wide margin."""
     smallest = _solved(matrix, np.zeros((matrix.shape[0], 0)))[1]
     # in the augmented matrix, rounding hides smaller values
-    least = 10 * tolerance if matrix.shape[0] == matrix.shape[1] else max(10 * tolerance, 1e-7)
-    return smallest > least * _largest_size(matrix)
+    lower_bound = 10 * tolerance if matrix.shape[0] == matrix.shape[1] else max(10 * tolerance, 1e-7)
+    return smallest > lower_bound * _largest_size(matrix)
 
 
 def _null_space(
@@ -304,8 +304,8 @@ def _null_space(
     width = PROBES + (max(0, columns - rows) if count is None else count)
     while True:
         block = nearest(min(columns, width))
-        _, sizes, turned = np.linalg.svd(np.linalg.qr(matrix @ block, mode="r"))
+        _, sizes, rotation = np.linalg.svd(np.linalg.qr(matrix @ block, mode="r"))
         if width >= columns or sizes[0] > 10 * DAMPING * size:
-            rank = np.count_nonzero(sizes > tolerance * size) if count is None else len(turned) - count
-            return block @ turned[rank:].T
+            rank = np.count_nonzero(sizes > tolerance * size) if count is None else len(rotation) - count
+            return block @ rotation[rank:].T
         width *= 4

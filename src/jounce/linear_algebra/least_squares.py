@@ -34,18 +34,18 @@ class LeastSquaresFactor(Module):
     def of(cls, matrix: Basis) -> "LeastSquaresFactor":
         """Factor matrices of shape (rows, columns, batch), with at least as many rows as columns."""
         _, columns, lanes = matrix.shape
-        at, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
+        take, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
         rows = np.arange(columns)[:, None]
 
         def orthogonalize(k: Any, carry: Any) -> Any:
             basis, triangle = carry
-            column, along = at(matrix, k, 1, False), jnp.zeros((columns, lanes))
+            column, coefficients = take(matrix, k, 1, False), jnp.zeros((columns, lanes))
             for _ in range(2):
                 part = jnp.sum(basis * column[:, None], axis=0)
-                column, along = column - jnp.sum(basis * part[None], axis=1), along + part
+                column, coefficients = column - jnp.sum(basis * part[None], axis=1), coefficients + part
             size = jnp.sqrt(jnp.sum(column * column, axis=0))
             basis = put(basis, column / jnp.where(size == 0, 1.0, size)[None], k, 1)
-            return basis, put(triangle, jnp.where(rows == k, size[None], along), k, 1)
+            return basis, put(triangle, jnp.where(rows == k, size[None], coefficients), k, 1)
 
         blank = cls.blank(matrix.shape, lanes)
         return cls(*jax.lax.fori_loop(0, columns, orthogonalize, (blank.basis, blank.triangle)))
@@ -68,8 +68,8 @@ class LeastSquaresFactor(Module):
     def applied_inverse(self, matrix: Float[Numbers, "row k"]) -> Float[Numbers, "column k"]:
         """Return the products of the pseudo-inverse of the first matrix with the columns of another, (columns, k)."""
         first = LeastSquaresFactor(self.basis[..., :1], self.triangle[..., :1])
-        many = [jnp.broadcast_to(x, (*x.shape[:-1], matrix.shape[1])) for x in (first.basis, first.triangle)]
-        return LeastSquaresFactor(*many).solve(matrix)
+        repeated = [jnp.broadcast_to(x, (*x.shape[:-1], matrix.shape[1])) for x in (first.basis, first.triangle)]
+        return LeastSquaresFactor(*repeated).solve(matrix)
 
     def pivot_ratio(self) -> Float[Numbers, " batch"]:
         """Return the ratio of smallest to largest pivot, shape (batch,): near zero at a singular position."""
@@ -86,13 +86,13 @@ class LeastSquaresFactor(Module):
 
     def _substituted(self, right: Float[Numbers, "column batch"], axis: int) -> Float[Numbers, "column batch"]:
         """Return the solutions of the triangular systems (`axis` 0), or of the transposed ones (`axis` 1)."""
-        at, put, columns = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim, len(self.triangle)
+        take, put, columns = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim, len(self.triangle)
 
         def substitute(i: Any, solved: Any) -> Any:
             k = i if axis else columns - 1 - i
-            line = at(self.triangle, k, axis, False)
-            rest = at(right, k, 0, False) - jnp.sum(line * solved, axis=0)
-            return put(solved, rest / at(line, k, 0, False), k, 0)
+            line = take(self.triangle, k, axis, False)
+            remainder = take(right, k, 0, False) - jnp.sum(line * solved, axis=0)
+            return put(solved, remainder / take(line, k, 0, False), k, 0)
 
         return jax.lax.fori_loop(0, columns, substitute, jnp.zeros(right.shape))
 
@@ -106,13 +106,13 @@ def range_basis(matrix: Basis, rank: int) -> Float[Numbers, "row rank batch"]:
     rows, _, lanes = matrix.shape
 
     def choose(k: Any, carry: Any) -> Any:
-        basis, left = carry
-        longest = jnp.argmax(jnp.sum(left * left, axis=0), axis=0)
-        column = jnp.take_along_axis(left, longest[None, None], axis=1)[:, 0]
+        basis, remainder = carry
+        longest = jnp.argmax(jnp.sum(remainder * remainder, axis=0), axis=0)
+        column = jnp.take_along_axis(remainder, longest[None, None], axis=1)[:, 0]
         column = column - jnp.sum(basis * jnp.sum(basis * column[:, None], axis=0)[None], axis=1)
         size = jnp.sqrt(jnp.sum(column * column, axis=0))
         column = column / jnp.where(size == 0, 1.0, size)[None]
-        left = left - column[:, None] * jnp.sum(column[:, None] * left, axis=0)[None]
-        return put(basis, column, k, 1), left
+        remainder = remainder - column[:, None] * jnp.sum(column[:, None] * remainder, axis=0)[None]
+        return put(basis, column, k, 1), remainder
 
     return jax.lax.fori_loop(0, rank, choose, (jnp.zeros((rows, rank, lanes)), matrix))[0]

@@ -36,18 +36,18 @@ class DenseFactor(Module):
         """Factor matrices of shape (rows, rows, batch)."""
         size, lanes = matrix.shape[0], matrix.shape[-1]
         rows = np.arange(size, dtype=np.int32)[:, None]
-        at, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
+        take, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
 
         def eliminate(k: Any, carry: Any) -> Any:
             matrix, free, order, pivots = carry
-            column = at(matrix, k, 1, False)
+            column = take(matrix, k, 1, False)
             largest = _largest(jnp.where(free, jnp.abs(column), -1.0), rows)
             row = _rows(matrix, largest[None])[0]
-            pivot, diagonal, chosen = at(row, k, 0), rows == k, rows == largest
+            pivot, diagonal, chosen = take(row, k, 0), rows == k, rows == largest
             # column k is replaced by that of the identity; a zero pivot leaves the other entries finite
             row = jnp.where(diagonal, 1.0, row) * (1.0 / jnp.where(pivot == 0, 1.0, pivot))
-            others = jnp.where(chosen[:, None] | diagonal[None], 0.0, matrix)
-            matrix = others - jnp.where(chosen, -1.0, column)[:, None] * row[None]
+            cleared = jnp.where(chosen[:, None] | diagonal[None], 0.0, matrix)
+            matrix = cleared - jnp.where(chosen, -1.0, column)[:, None] * row[None]
             return matrix, free & ~chosen, put(order, largest, k, 0), put(pivots, pivot, k, 0)
 
         pivots = np.zeros((size, lanes))
@@ -74,9 +74,9 @@ class DenseFactor(Module):
 
         Refined solutions have the square of this error. It is NaN where a matrix is singular.
         """
-        known = np.where(np.arange(len(self.order)) % 3 == 1, -1.0, 1.0)
-        right = jnp.sum(self.matrix * known[None, :, None], axis=1)
-        return jnp.max(jnp.abs(self.solve(right, refined=False) - known[:, None]), axis=0)
+        solution = np.where(np.arange(len(self.order)) % 3 == 1, -1.0, 1.0)
+        right = jnp.sum(self.matrix * solution[None, :, None], axis=1)
+        return jnp.max(jnp.abs(self.solve(right, refined=False) - solution[:, None]), axis=0)
 
     def solve(self, right: Columns, *, refined: bool = True) -> Columns:
         """Return the solutions for right-hand sides of shape (rows, batch); NaN where a matrix is singular.
@@ -91,8 +91,8 @@ class DenseFactor(Module):
         solution = product(right)
         if not refined:
             return solution * self._regular()
-        rest = right - jnp.sum(self.matrix * solution[None], axis=1)
-        return (solution + product(rest)) * self._regular()
+        residual = right - jnp.sum(self.matrix * solution[None], axis=1)
+        return (solution + product(residual)) * self._regular()
 
     def solve_transposed(self, right: Columns) -> Columns:
         """Return the solutions of the transposed systems, for right-hand sides of shape (rows, batch)."""
@@ -103,8 +103,8 @@ class DenseFactor(Module):
             return _rows(jnp.sum(self.eliminated * rows[:, None], axis=0), rank)
 
         solution = product(right)
-        rest = right - jnp.sum(self.matrix * solution[:, None], axis=0)
-        return (solution + product(rest)) * self._regular()
+        residual = right - jnp.sum(self.matrix * solution[:, None], axis=0)
+        return (solution + product(residual)) * self._regular()
 
     def inverse(self) -> Matrices:
         """Return the inverse matrices, shape (rows, rows, batch), for many successive right-hand sides."""
@@ -124,10 +124,10 @@ class DenseFactor(Module):
     def sign(self) -> Float[Numbers, " batch"]:
         """Return the signs of the determinants, shape (batch,): 0 where singular, NaN where not finite."""
         size = len(self.order)
-        later = np.triu(np.ones((size, size), bool), 1)[..., None]
-        swaps = later & (self.order[:, None] > self.order[None])
-        odd = jnp.sum(swaps, axis=(0, 1)) % 2 == 1
-        return jnp.prod(jnp.sign(self.pivots), axis=0) * jnp.where(odd, -1.0, 1.0)
+        upper = np.triu(np.ones((size, size), bool), 1)[..., None]
+        swaps = upper & (self.order[:, None] > self.order[None])
+        is_odd = jnp.sum(swaps, axis=(0, 1)) % 2 == 1
+        return jnp.prod(jnp.sign(self.pivots), axis=0) * jnp.where(is_odd, -1.0, 1.0)
 
     def _rank(self) -> Int[Numbers, "row batch"]:
         """Return the index of the pivot in each row; `argsort` would call an XLA library."""
@@ -182,15 +182,15 @@ def singular_values(
 
     def rotate(k: Any, carry: Any) -> Any:
         p, q = (pairs[k % len(pairs)] for pairs in (first, second))
-        at, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
-        a, b = (at(carry[0], index, 0, False) for index in (p, q))
+        take, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
+        a, b = (take(carry[0], index, 0, False) for index in (p, q))
         product, excess = 2 * jnp.sum(a * b, axis=0), jnp.sum(b * b - a * a, axis=0)
         root = jnp.abs(excess) + jnp.hypot(excess, product)
         tangent = jnp.where(excess < 0, -1.0, 1.0) * product / jnp.where(root == 0, 1.0, root)
         cosine = 1 / jnp.hypot(1.0, tangent)
 
         def turned(part: Any) -> Any:
-            a, b = (at(part, index, 0, False) for index in (p, q))
+            a, b = (take(part, index, 0, False) for index in (p, q))
             c, s = cosine[None], (cosine * tangent)[None]
             return put(put(part, c * a - s * b, p, 0), s * a + c * b, q, 0)
 

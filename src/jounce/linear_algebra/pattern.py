@@ -49,18 +49,18 @@ class Pattern(Module):
             Number of bodies, without the ground.
         """
         blocks = [count * group.instances for count, group in zip(row_counts, groups, strict=True)]
-        touching = [len(group.moving_slots) for group in groups]
-        entry_count = width * sum(map(math.prod, zip(blocks, touching, strict=True)))
-        bodies = np.full((sum(blocks), max(touching, default=1)), body_count)
+        slot_counts = [len(group.moving_slots) for group in groups]
+        entry_count = width * sum(map(math.prod, zip(blocks, slot_counts, strict=True)))
+        bodies = np.full((sum(blocks), max(slot_counts, default=1)), body_count)
         entry_indices = np.full((*bodies.shape, width), entry_count)
         row = first = 0
         for block, count, group in zip(blocks, row_counts, groups, strict=True):
             block_rows = slice(row, row + block)
             for k, slot in enumerate(group.moving_slots):
-                touched = np.tile(group.bodies[slot], count) - 1
-                bodies[block_rows, k] = np.where(touched < 0, body_count, touched)
+                slot_bodies = np.tile(group.bodies[slot], count) - 1
+                bodies[block_rows, k] = np.where(slot_bodies < 0, body_count, slot_bodies)
                 indices = first + np.arange(width * block).reshape(width, block).T
-                entry_indices[block_rows, k] = np.where(touched[:, None] < 0, entry_count, indices)
+                entry_indices[block_rows, k] = np.where(slot_bodies[:, None] < 0, entry_count, indices)
                 first += width * block
             row += block
         return cls(bodies.astype(np.int32), entry_indices.astype(np.int32), body_count, entry_count, tuple(row_counts))

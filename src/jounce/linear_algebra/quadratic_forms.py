@@ -53,11 +53,11 @@ def common_zeros(
     """
     x = starts / np.linalg.norm(starts, axis=1, keepdims=True)
     for _ in range(steps):
-        along = np.einsum("fij,nj->nfi", forms, x)
-        values = np.einsum("nfi,ni->nf", along, x)
-        slopes = np.concatenate([2 * along, x[:, None]], axis=1)
-        right = np.concatenate([values, np.zeros((len(x), 1))], axis=1)
-        step = np.einsum("nij,nj->ni", np.linalg.pinv(slopes, rcond=1e-10), right)
+        images = np.einsum("fij,nj->nfi", forms, x)
+        values = np.einsum("nfi,ni->nf", images, x)
+        slopes = np.concatenate([2 * images, x[:, None]], axis=1)
+        rhs = np.concatenate([values, np.zeros((len(x), 1))], axis=1)
+        step = np.einsum("nij,nj->ni", np.linalg.pinv(slopes, rcond=1e-10), rhs)
         step *= np.minimum(1.0, longest / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
         x = (x - step) / np.linalg.norm(x - step, axis=1, keepdims=True)
     return x[np.abs(np.einsum("fij,ni,nj->nf", forms, x, x)).max(axis=1) <= tolerance]

@@ -39,17 +39,17 @@ class ReflectedFactor(Module):
     @classmethod
     @by_certain_entries()
     def _of_ordered(cls, matrix: Float[Numbers, "row row batch"], order: Order) -> "ReflectedFactor":
-        columns, pivots, shares, rows, rest = [], [], [], [], matrix
+        columns, pivots, shares, rows, remainder = [], [], [], [], matrix
         for _ in range(len(matrix)):
-            column, pivot, share = reflection(rest[:, 0])
-            others = rest[:, 1:]
-            part = jnp.sum(column[:, None] * others, axis=0) * share[None]
-            others = others - column[:, None] * part[None]
+            column, pivot, share = reflection(remainder[:, 0])
+            trailing = remainder[:, 1:]
+            part = jnp.sum(column[:, None] * trailing, axis=0) * share[None]
+            trailing = trailing - column[:, None] * part[None]
             columns.append(column)
             pivots.append(pivot)
             shares.append(share)
-            rows.append(others[0])
-            rest = others[1:]
+            rows.append(trailing[0])
+            remainder = trailing[1:]
         size = len(matrix)
         reduced = [
             jnp.concatenate([jnp.stack([columns[j][i - j] for j in range(i + 1)]), rows[i]]) for i in range(size)
@@ -77,9 +77,9 @@ class ReflectedFactor(Module):
 
         Refined solutions have the square of this error. It is not finite where a matrix is singular.
         """
-        known = np.where(np.arange(len(self.pivots)) % 3 == 1, -1.0, 1.0)
-        right = jnp.sum(self.matrix * known[None, :, None], axis=1)
-        return jnp.max(jnp.abs(_substituted(self, right) - known[:, None]), axis=0)
+        solution = np.where(np.arange(len(self.pivots)) % 3 == 1, -1.0, 1.0)
+        right = jnp.sum(self.matrix * solution[None, :, None], axis=1)
+        return jnp.max(jnp.abs(_substituted(self, right) - solution[:, None]), axis=0)
 
     @by_certain_entries()
     def solve(self, right: Columns, *, refined: bool = True) -> Columns:
@@ -117,8 +117,8 @@ def reflection(first: Columns) -> tuple[Columns, Float[Numbers, " batch"], Float
     pivot = jnp.where(first[0] > 0, -length, length)
     head = first[0] - pivot
     square = length * (length + jnp.abs(first[0]))  # half the squared length of the reflection
-    share = jnp.where(square == 0, 0.0, 1.0 / jnp.where(square == 0, 1.0, square))
-    return jnp.concatenate([head[None], first[1:]]), pivot, share
+    factor = jnp.where(square == 0, 0.0, 1.0 / jnp.where(square == 0, 1.0, square))
+    return jnp.concatenate([head[None], first[1:]]), pivot, factor
 
 
 def _ordered(matrix: Float[Numbers, "row row batch"], order: Order) -> Float[Numbers, "row row batch"]:
@@ -134,8 +134,8 @@ def _substituted(factor: ReflectedFactor, right: Columns) -> Columns:
         column = factor.reduced[k:, k]
         part = jnp.sum(column * right[k:], axis=0) * factor.shares[k]
         right = jnp.concatenate([right[:k], right[k:] - column * part[None]])
-    solved = right[:0]
+    solution = right[:0]
     for k in reversed(range(size)):
-        rest = right[k] - jnp.sum(factor.reduced[k, k + 1 :] * solved, axis=0)
-        solved = jnp.concatenate([(rest / factor.pivots[k])[None], solved])
-    return solved
+        remainder = right[k] - jnp.sum(factor.reduced[k, k + 1 :] * solution, axis=0)
+        solution = jnp.concatenate([(remainder / factor.pivots[k])[None], solution])
+    return solution

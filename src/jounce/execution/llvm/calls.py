@@ -39,5 +39,5 @@ def call(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
 def _in_one_piece(code: Code, array: Array) -> Stored:
     """Return a contiguous array at the beginning of its memory."""
     result = stored(code, array)
-    whole = result.is_same(contiguous(result.region, result.shape)) or not math.prod(result.shape)
-    return result if whole else copied(code, result)
+    is_contiguous = result.is_same(contiguous(result.region, result.shape)) or not math.prod(result.shape)
+    return result if is_contiguous else copied(code, result)

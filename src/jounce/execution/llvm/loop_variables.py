@@ -64,20 +64,20 @@ class LoopVariables:
             New arrays of the active lanes; a number that is already in its place is not loaded.
         """
 
-        def number(which: int, k: int, value: Value | None) -> Value:
-            if value is not None and value.home == (self.regions[which], k):
+        def number(index: int, k: int, value: Value | None) -> Value:
+            if value is not None and value.home == (self.regions[index], k):
                 return value
-            known = self.invariants[which].get(k) or self._same_in(which, k, ways)
-            return known or self.code.load(self.regions[which], k)
+            invariant = self.invariants[index].get(k) or self._same_in(index, k, ways)
+            return invariant or self.code.load(self.regions[index], k)
 
         result: list[Array] = []
-        for which, (shape, large) in enumerate(zip(self.shapes, self.large, strict=True)):
+        for index, (shape, large) in enumerate(zip(self.shapes, self.large, strict=True)):
             if large:
-                result.append(contiguous(self.regions[which], shape))
+                result.append(contiguous(self.regions[index], shape))
                 continue
-            array = None if new is None else new[which]
+            array = None if new is None else new[index]
             values = flat(array) if isinstance(array, np.ndarray) else [None] * math.prod(shape)
-            result.append(filled(shape, [number(which, k, value) for k, value in enumerate(values)]))
+            result.append(filled(shape, [number(index, k, value) for k, value in enumerate(values)]))
         return result
 
     @contextmanager
@@ -93,9 +93,9 @@ class LoopVariables:
     def store(self, arrays: Sequence[Array]) -> None:
         """Store the arrays; numbers that are unchanged since they were loaded are not stored."""
         targets = [contiguous(region, shape) for region, shape in zip(self.regions, self.shapes, strict=True)]
-        changing = {target.region for target, array in zip(targets, arrays, strict=True) if not target.is_same(array)}
+        changed = {target.region for target, array in zip(targets, arrays, strict=True) if not target.is_same(array)}
         read_first = [  # arrays that are parts of changing arrays are copied first
-            copied(self.code, array) if _reads_others(array, target, changing) else array
+            copied(self.code, array) if _reads_others(array, target, changed) else array
             for target, array in zip(targets, arrays, strict=True)
         ]
         for number, (target, array) in enumerate(zip(targets, read_first, strict=True)):
@@ -114,22 +114,22 @@ class LoopVariables:
 
     def note_rows(self, rows: Sequence[Array], length: int) -> None:
         """Record the constants in rows that a loop makes, one in each of `length` iterations."""
-        for known, row in zip(self.invariants, rows, strict=True):
+        for invariants, row in zip(self.invariants, rows, strict=True):
             if not isinstance(row, InMemory):
                 constants = [(k, value) for k, value in enumerate(flat(row)) if may_be_invariant(value)]
-                known |= {turn * row.size + k: value for turn in range(length) for k, value in constants}
+                invariants |= {turn * row.size + k: value for turn in range(length) for k, value in constants}
 
     def note_invariants(self, ways: int) -> None:
         """Remove the stores of constants that are the same in all branches, each emitted in its own scope."""
-        for (which, k), stores in self._stored.items():
-            if (value := self._same_in(which, k, ways)) is not None:
-                self.invariants[which][k] = value
+        for (index, k), stores in self._stored.items():
+            if (value := self._same_in(index, k, ways)) is not None:
+                self.invariants[index][k] = value
                 for _, lines in stores:
                     self.code.lines[lines] = [""] * (lines.stop - lines.start)
 
-    def _same_in(self, which: int, k: int, ways: int) -> Value | None:
+    def _same_in(self, index: int, k: int, ways: int) -> Value | None:
         """Return the constant that all branches have stored at an index; None if they differ."""
-        stored = [value for value, _ in self._stored.get((which, k), ())]
+        stored = [value for value, _ in self._stored.get((index, k), ())]
         if len(stored) != ways or not all(is_same_constant(stored[0], value) for value in stored):
             return None
         return stored[0] if stored else None
@@ -174,10 +174,10 @@ def chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array]
     return [either(x, y) for x, y in zip(new, old, strict=True)]
 
 
-def _reads_others(array: Array, target: Stored, changing: Collection[Region]) -> bool:
+def _reads_others(array: Array, target: Stored, changed: Collection[Region]) -> bool:
     """Return whether an array reads changing numbers other than the one that each number replaces."""
     read = array.given if isinstance(array, Deferred) else [array] if isinstance(array, Stored) else []
-    return any(part.region in changing and not target.is_same(part) for part in read)
+    return any(part.region in changed and not target.is_same(part) for part in read)
 
 
 class Homes:
@@ -221,7 +221,7 @@ def unchanged(ways: Sequence[Any], inputs: Sequence[Array]) -> list[Array | None
 
 
 def changed_in_place(
-    code: Code, which: Value, first: Any, inputs: Sequence[Array], results: Sequence[int]
+    code: Code, branch: Value, first: Any, inputs: Sequence[Array], results: Sequence[int]
 ) -> list[Region | None]:
     """Return the loop memory of results that can be changed in place, since the first branch leaves them unchanged.
 
@@ -229,7 +229,7 @@ def changed_in_place(
     ----------
     code : Code
         Code to emit to.
-    which : Value
+    branch : Value
         Index of the branch that a lane takes.
     first : Jaxpr
         The first branch.
@@ -242,11 +242,11 @@ def changed_in_place(
     regions: list[Region | None] = []
     for variable in [first.outvars[k] for k in results]:
         array, region = None if isinstance(variable, Literal) else given.get(variable), None
-        if isinstance(array, np.ndarray) and code.large is None and (which.lanes or code.active is None):
+        if isinstance(array, np.ndarray) and code.large is None and (branch.lanes or code.active is None):
             values = [(k, value) for k, value in enumerate(flat(array)) if value.constant is None]
             homes = {value.home and value.home[0] for _, value in values}
-            its = homes.pop() if len(homes) == 1 else None
-            if its is not None and its.lanes and its in code.changes and its not in regions:
-                region = its if all(value.home == (its, k) for k, value in values) else None
+            home = homes.pop() if len(homes) == 1 else None
+            if home is not None and home.lanes and home in code.changes and home not in regions:
+                region = home if all(value.home == (home, k) for k, value in values) else None
         regions.append(region)
     return regions

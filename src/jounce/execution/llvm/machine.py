@@ -96,9 +96,9 @@ def _compiled_elsewhere(text: str, hasty: bool) -> bytes | None:
     if not Path(sys.executable or "").name.startswith("python"):  # may be an application that embeds Python
         return None
     # run as a file, since the module would import JAX; -P keeps its folder off the import path
-    words = [sys.executable, "-P", __file__, *(HASTE if hasty else ())]
+    command = [sys.executable, "-P", __file__, *(HASTE if hasty else ())]
     try:
-        return subprocess.run(words, input=text.encode(), capture_output=True, check=True).stdout
+        return subprocess.run(command, input=text.encode(), capture_output=True, check=True).stdout
     except (OSError, subprocess.SubprocessError):
         return None
 

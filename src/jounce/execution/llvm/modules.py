@@ -33,7 +33,7 @@ def object_file(
     function: Callable[..., Any],
     shared: Any,
     lanes: Any,
-    known: Mapping[int, np.ndarray],
+    leaf_values: Mapping[int, np.ndarray],
     *,
     rows: bool = False,
     large: int | None = None,
@@ -50,7 +50,7 @@ def object_file(
         length one, as in all results.
     shared, lanes : pytree
         Arrays, or objects with their shapes and types.
-    known : mapping
+    leaf_values : mapping
         Leaves of `shared`, by index, whose values are compiled in.
     rows : bool, default False
         Whether arrays of many instants, arguments and results, have the instants along their first axis.
@@ -72,7 +72,7 @@ def object_file(
         traced, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
         closed = in_plain_operations(traced)
         try:
-            text = _written(closed, count, known, vector_width(), rows=rows, large=large, single=single)
+            text = _written(closed, count, leaf_values, vector_width(), rows=rows, large=large, single=single)
         except (AttributeError, KeyError, TypeError) as failure:  # JAX describes an operation by other names
             if is_tested_release():
                 raise
@@ -80,20 +80,20 @@ def object_file(
     return compiled(text, hasty=hasty, brief=brief), results
 
 
-def _written(*program: Any, large: int | None, **how: Any) -> str:
+def _written(*program: Any, large: int | None, **options: Any) -> str:
     """Return the text of a module; with large arrays in memory if unrolled code is too long or does not exist."""
     try:
-        return _text(*program, large=large, **how)
+        return _text(*program, large=large, **options)
     except UnsupportedOperationError:
         if large is not None:
             raise
-    return _text(*program, large=LARGE, **how)
+    return _text(*program, large=LARGE, **options)
 
 
 def _text(
     closed: Any,
     shared: int,
-    known: Mapping[int, np.ndarray],
+    leaf_values: Mapping[int, np.ndarray],
     width: int,
     *,
     rows: bool = False,
@@ -101,11 +101,11 @@ def _text(
     single: bool = False,
 ) -> str:
     """Return the text of a module with a function `run` of the addresses of all arrays and the number of lanes."""
-    most = MOST_LINES_WITHOUT_LOOPS if large is None else MOST_LINES
-    code, given = Code(width, most, large=large, single=single), []
+    line_limit = MOST_LINES_WITHOUT_LOOPS if large is None else MOST_LINES
+    code, given = Code(width, line_limit, large=large, single=single), []
     for number, variable in enumerate(closed.jaxpr.invars):
-        if number in known:
-            given.append(constants(known[number]))
+        if number in leaf_values:
+            given.append(constants(leaf_values[number]))
             continue
         region = _region(code, number, kind_of(variable.aval.dtype), lanes=number >= shared and not single)
         shape = variable.aval.shape
@@ -123,9 +123,9 @@ def _text(
         _write(code, number, array, rows=rows)
     if code.memory > MOST_MEMORY or code.heap > MOST_HEAP:
         raise UnsupportedOperationError(f"a program with {code.memory + code.heap:,} bytes of memory of its own")
-    borrowed, returned = [], []
+    allocation, release = [], []
     if code.heap:
-        borrowed, returned = (
+        allocation, release = (
             [
                 f"%block = call noalias ptr @malloc(i64 {code.heap + 64})",
                 "%address = ptrtoint ptr %block to i64",
@@ -149,17 +149,17 @@ def _text(
         "br i1 %over, label %end, label %lanes",
         "end:",
     ]
-    turning = [sine_and_cosine(code)] if {(name, 1) for name in TURNS} <= code.functions else []
+    routines = [sine_and_cosine(code)] if {(name, 1) for name in TURNS} <= code.functions else []
     lines = [
         *code.constants,
-        *turning,
+        *routines,
         *(subroutine.text for subroutine in code.subroutines.values()),
         "define void @run(ptr noalias %arguments, i64 %total) #1 {",
         "begin:",
-        *borrowed,
+        *allocation,
         *code.entry,
         *(code.lines if single else loop),
-        *returned,
+        *release,
         "ret void",
         "}",
         "declare noalias ptr @malloc(i64)",
@@ -200,10 +200,10 @@ def _lane_by_lane(name: str, count: int, width: int) -> str:
     vector, lines = f"<{width} x double>", []
     for lane in range(width):
         lines += [f"%e{lane}_{k} = extractelement {vector} %a{k}, i64 {lane}" for k in range(count)]
-        given = ", ".join(f"double %e{lane}_{k}" for k in range(count))
-        lines.append(f"%r{lane} = call double @{name}({given})")
+        arguments = ", ".join(f"double %e{lane}_{k}" for k in range(count))
+        lines.append(f"%r{lane} = call double @{name}({arguments})")
         before = "poison" if lane == 0 else f"%s{lane - 1}"
         lines.append(f"%s{lane} = insertelement {vector} {before}, double %r{lane}, i64 {lane}")
-    listed = ", ".join(f"{vector} %a{k}" for k in range(count))
+    parameters = ", ".join(f"{vector} %a{k}" for k in range(count))
     body = "\n".join([*lines, f"ret {vector} %s{width - 1}"])
-    return f"define internal {vector} @{name}_of_lanes({listed}) noinline #2 {{\n{body}\n}}"
+    return f"define internal {vector} @{name}_of_lanes({parameters}) noinline #2 {{\n{body}\n}}"

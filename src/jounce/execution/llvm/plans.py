@@ -96,8 +96,8 @@ def _written(
     names: dict[Any, Any],
     operations: list[Operation],
     constants: dict[Any, Any],
-    known: dict[Any, list[Any]] | None,
-    alike: dict[Any, Any],
+    earlier: dict[Any, list[Any]] | None,
+    equals: dict[Any, Any],
     *,
     whole: bool,
     sparse: bool = False,
@@ -109,9 +109,9 @@ def _written(
     program : Jaxpr
     names : dict
         New names of its variables; others keep their names. A program that is called twice has new names each time.
-    known : dict or None
+    earlier : dict or None
         Results of earlier operations by key, so that repeated operations are emitted once; None to repeat them.
-    alike : dict
+    equals : dict
         The first equal result of each result.
     whole : bool
         Whether the program is not called by another one.
@@ -134,32 +134,32 @@ def _written(
             for variable, value in zip(called.constvars, values, strict=True):
                 inner[variable] = Variable(variable.aval)
                 constants[inner[variable]] = value
-            written = _written(called, inner, operations, constants, known, alike, whole=False, sparse=is_sparse)
-            names |= zip(result, written, strict=True)
+            results = _written(called, inner, operations, constants, earlier, equals, whole=False, sparse=is_sparse)
+            names |= zip(result, results, strict=True)
             continue
-        key = None if known is None else _key(equation, given, alike, is_sparse)
-        before = None if known is None or key is None else known.get(key)
+        key = None if earlier is None else _key(equation, given, equals, is_sparse)
+        before = None if earlier is None or key is None else earlier.get(key)
         if before is not None and equation.primitive.name not in VIEWS:
             names |= zip(result, before, strict=True)
             continue
         if not whole:
             result = [Variable(variable.aval) for variable in result]
             names |= zip(equation.outvars, result, strict=True)
-        if known is not None and key is not None:
-            alike |= zip(result, before or result, strict=True)
-            known.setdefault(key, result)
+        if earlier is not None and key is not None:
+            equals |= zip(result, before or result, strict=True)
+            earlier.setdefault(key, result)
         operations.append(Operation(equation.primitive, equation.params, given, result, is_sparse))
     return [name(variable) for variable in program.outvars]
 
 
-def _key(equation: Any, given: Sequence[Any], alike: Mapping[Any, Any], sparse: bool) -> Any:
+def _key(equation: Any, given: Sequence[Any], equals: Mapping[Any, Any], sparse: bool) -> Any:
     """Return the key that identifies an operation; None if there is none."""
 
     def number(x: Any) -> Any:
         if isinstance(x, Literal):
             aval: Any = x.aval
             return aval.shape, aval.dtype, np.asarray(x.val).tobytes()
-        return alike.get(x, x)
+        return equals.get(x, x)
 
     p = equation.params
     key = equation.primitive.name, sparse, *(sorted(p.items()) if len(p) > 1 else p.items()), *map(number, given)
@@ -208,8 +208,8 @@ def _delayed(
     for number, operation in reversed([*enumerate(operations)]):
         if operation.primitive.name not in deferred or len(operation.outvars) != 1:
             continue
-        reader, *more = readers.get(operation.outvars[0], [-1])
-        if more or reader < 0:
+        reader, *others = readers.get(operation.outvars[0], [-1])
+        if others or reader < 0:
             continue
         name = None if reader == len(operations) else operations[reader].primitive.name
         if name is None or name in deferred or name in reading:

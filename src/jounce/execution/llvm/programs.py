@@ -34,16 +34,16 @@ class Layout:
         End of the last array in bytes.
     """
 
-    def __init__(self, kinds: Sequence[tuple[tuple[int, ...], Any]], begin: int = 0):
+    def __init__(self, kinds: Sequence[tuple[tuple[int, ...], Any]], start: int = 0):
         self._kinds = [(shape, np.dtype(dtype)) for shape, dtype in kinds]
-        self.offsets, self.end, self._groups = np.empty(len(kinds), np.int64), begin, []
+        self.offsets, self.end, self._groups = np.empty(len(kinds), np.int64), start, []
         by_type = sorted(range(len(kinds)), key=lambda k: self._kinds[k][1].str)
         for _, group in itertools.groupby(by_type, key=lambda k: self._kinds[k][1].str):
-            members, first = list(group), -(-self.end // 64) * 64
+            members, offset = list(group), -(-self.end // 64) * 64
             dtype, sizes = self._kinds[members[0]][1], [math.prod(self._kinds[k][0]) for k in members]
-            ends = first + dtype.itemsize * np.cumsum([0, *sizes])
+            ends = offset + dtype.itemsize * np.cumsum([0, *sizes])
             self.offsets[members], self.end = ends[:-1], int(ends[-1])
-            self._groups.append((members, slice(first, self.end)))
+            self._groups.append((members, slice(offset, self.end)))
         self._places = list(zip(self._kinds, self.offsets.tolist(), strict=True))
 
     def put(self, memory: np.ndarray, arrays: Sequence[np.ndarray]) -> None:
@@ -79,10 +79,10 @@ class Block:
     def results(self, run: MachineCode, given: Sequence[np.ndarray], lanes: int) -> list[np.ndarray]:
         """Return the results of machine code for arguments of the shapes and types of the block."""
         memory = lend(self._results.end)
-        first = address_of(memory)
-        np.add(self._offsets, first, out=memory[: self._addresses].view(np.int64))
+        address = address_of(memory)
+        np.add(self._offsets, address, out=memory[: self._addresses].view(np.int64))
         self._given.put(memory, given)
-        run(first, lanes)
+        run(address, lanes)
         return self._results.views(memory)
 
 
@@ -136,7 +136,11 @@ class Program:
         self.name = f"jounce_{hashlib.sha256(binary + read).hexdigest()[:32]}"
 
     def __call__(
-        self, shared: Sequence[np.ndarray], lanes: Sequence[np.ndarray], parts: int = 1, each: Callable[..., Any] = map
+        self,
+        shared: Sequence[np.ndarray],
+        lanes: Sequence[np.ndarray],
+        parts: int = 1,
+        parallel_map: Callable[..., Any] = map,
     ) -> Any:
         """Return the results.
 
@@ -146,7 +150,7 @@ class Program:
             Leaves of the arguments; instants along the last axis, or along the first.
         parts : int, default 1
             Number of calls of the machine code that share the instants, if these lie along the first axis.
-        each : callable, optional
+        parallel_map : callable, optional
             Function like `map` that makes these calls; the machine code may run in several threads.
         """
         axis = 0 if self._rows else -1
@@ -178,7 +182,7 @@ class Program:
                     pointers = [address + start * step for address, step in zip(addresses, steps, strict=True)]
                     self._run((ctypes.c_void_p * len(pointers))(*pointers), stop - start)
 
-            list(each(run, range(parts)))
+            list(parallel_map(run, range(parts)))
         return jax.tree.unflatten(self._structure, [x[first] for x in result])
 
     def rounds(

@@ -30,22 +30,22 @@ class Column(NamedTuple):
     dtype: np.dtype[Any]
     whole: np.ndarray | None
 
-    def addresses(self, least: int) -> list[int]:
-        """Return the addresses of the numbers of the first instant in an array of at least `least` instants.
+    def addresses(self, count: int) -> list[int]:
+        """Return the addresses of the numbers of the first instant in an array of at least `count` instants.
 
         Raises
         ------
         ValueError
             If the machine code cannot read the array.
         """
-        whole: Any = self.whole
-        result = whole.shape[:-1], whole.dtype, whole.dtype.itemsize, whole.strides[-1]
-        if result != (self.shape, self.dtype, ENTRY, ENTRY) or whole.shape[-1] < least:
+        array: Any = self.whole
+        result = array.shape[:-1], array.dtype, array.dtype.itemsize, array.strides[-1]
+        if result != (self.shape, self.dtype, ENTRY, ENTRY) or array.shape[-1] < count:
             raise ValueError(
-                f"an array of {whole.dtype}{whole.shape}, for {self.dtype}{self.shape} of {least} instants"
+                f"an array of {array.dtype}{array.shape}, for {self.dtype}{self.shape} of {count} instants"
             )
-        indices = [address_of(whole)]
-        for size, step in zip(whole.shape[:-1], whole.strides[:-1], strict=True):
+        indices = [address_of(array)]
+        for size, step in zip(array.shape[:-1], array.strides[:-1], strict=True):
             indices = [index + k * step for index in indices for k in range(size)]
         return indices
 
@@ -84,14 +84,14 @@ def rounds_text(width: int) -> str:
         "%round_targets = getelementptr i64, ptr %targets, i64 %first",
     ]
     for lane in range(width):
-        least = f"%least{lane - 1}" if lane else "0"
+        minimum = f"%least{lane - 1}" if lane else "0"
         lines += [
             f"%place{lane} = getelementptr i64, ptr %round_targets, i64 {lane}",
             f"%target{lane} = load i64, ptr %place{lane}",
             f"%from{lane} = getelementptr i64, ptr %sources, i64 %target{lane}",
             f"%source{lane} = load i64, ptr %from{lane}",
-            f"%less{lane} = icmp slt i64 %source{lane}, {least}",
-            f"%least{lane} = select i1 %less{lane}, i64 %source{lane}, i64 {least}",
+            f"%less{lane} = icmp slt i64 %source{lane}, {minimum}",
+            f"%least{lane} = select i1 %less{lane}, i64 %source{lane}, i64 {minimum}",
         ]
     lines += [
         "%firsts = add i64 %linked, %linked",
@@ -141,10 +141,10 @@ def _copies(name: str, limits: tuple[str, str, str], after: str, copy: Sequence[
 
 def _vector(name: str, width: int) -> list[str]:
     """Return code that copies a result of all lanes to the argument of the next round."""
-    of = f"<{width} x i64>"
+    llvm_type = f"<{width} x i64>"
     return [
-        f"%{name}_all = load {of}, ptr %{name}_whole, align 8",
-        f"store {of} %{name}_all, ptr %{name}_round, align 8",
+        f"%{name}_all = load {llvm_type}, ptr %{name}_whole, align 8",
+        f"store {llvm_type} %{name}_all, ptr %{name}_round, align 8",
     ]
 
 
@@ -167,28 +167,28 @@ def _started(lane: int, width: int) -> list[str]:
 
 def _gathered(name: str, index: str, width: int) -> list[str]:
     """Return code that gathers a number of the instants of a round into its vector."""
-    of, lines, vector = f"<{width} x i64>", [], "poison"
+    llvm_type, lines, vector = f"<{width} x i64>", [], "poison"
     for lane in range(width):
-        at = f"%{name}_{lane}"
+        prefix = f"%{name}_{lane}"
         lines += [
-            f"{at}p = getelementptr i64, ptr %{name}_whole, i64 %{index}{lane}",
-            f"{at}v = load i64, ptr {at}p",
-            f"{at}w = insertelement {of} {vector}, i64 {at}v, i64 {lane}",
+            f"{prefix}p = getelementptr i64, ptr %{name}_whole, i64 %{index}{lane}",
+            f"{prefix}v = load i64, ptr {prefix}p",
+            f"{prefix}w = insertelement {llvm_type} {vector}, i64 {prefix}v, i64 {lane}",
         ]
-        vector = f"{at}w"
-    return [*lines, f"store {of} {vector}, ptr %{name}_round, align 8"]
+        vector = f"{prefix}w"
+    return [*lines, f"store {llvm_type} {vector}, ptr %{name}_round, align 8"]
 
 
 def _scattered(name: str, width: int) -> list[str]:
     """Return code that scatters a number of the instants of a round to their places."""
-    of = f"<{width} x i64>"
-    lines = [f"%{name}_all = load {of}, ptr %{name}_round, align 8"]
+    llvm_type = f"<{width} x i64>"
+    lines = [f"%{name}_all = load {llvm_type}, ptr %{name}_round, align 8"]
     for lane in range(width):
-        at = f"%{name}_{lane}"
+        prefix = f"%{name}_{lane}"
         lines += [
-            f"{at}v = extractelement {of} %{name}_all, i64 {lane}",
-            f"{at}p = getelementptr i64, ptr %{name}_whole, i64 %target{lane}",
-            f"store i64 {at}v, ptr {at}p",
+            f"{prefix}v = extractelement {llvm_type} %{name}_all, i64 {lane}",
+            f"{prefix}p = getelementptr i64, ptr %{name}_whole, i64 %target{lane}",
+            f"store i64 {prefix}v, ptr {prefix}p",
         ]
     return lines
 
@@ -238,19 +238,19 @@ class RoundRunner:
         self._common = np.array([address_of(x) for x in self._arrays[0]], np.int64)
         ends = np.cumsum([0, *(column.room(width) for column in columns)])
         self._begins, self._blank = ends[:-1], np.zeros(ends[-1], np.uint8)
-        begins = iter(self._begins.tolist())
-        at_source = _pairs(linked, begins, width, self._known)
-        at_target = _pairs(own, begins, width, len(sources))
-        for column, begin in zip(held, begins, strict=False):
+        offsets = iter(self._begins.tolist())
+        at_source = _pairs(linked, offsets, width, self._known)
+        at_target = _pairs(own, offsets, width, len(sources))
+        for column, offset in zip(held, offsets, strict=False):
             numbers = np.repeat(np.asarray(column.whole, column.dtype).reshape(*column.shape, 1), width, axis=-1)
-            self._blank[begin : begin + numbers.nbytes] = numbers.ravel().view(np.uint8)
-        begins = list(begins)
-        result = _pairs(results, iter(begins), width, len(sources))
+            self._blank[offset : offset + numbers.nbytes] = numbers.ravel().view(np.uint8)
+        offsets = list(offsets)
+        result = _pairs(results, iter(offsets), width, len(sources))
         self._counts = len(at_source), len(at_target), len(result)
-        of = (begins[k] + width * ENTRY * n for k, x in zip(links, linked, strict=True) for n in range(x.size))
-        again = [(begin, given) for begin, (_, given) in zip(of, at_source, strict=True)]
-        self._pairs = np.array([*again, *at_source, *at_target, *result], np.int64).reshape(-1, 2)
-        self._within = np.array([[1, 1]] * len(again) + [[0, 1]] * (len(self._pairs) - len(again)))
+        starts = (offsets[k] + width * ENTRY * n for k, x in zip(links, linked, strict=True) for n in range(x.size))
+        carried = [(offset, given) for offset, (_, given) in zip(starts, at_source, strict=True)]
+        self._pairs = np.array([*carried, *at_source, *at_target, *result], np.int64).reshape(-1, 2)
+        self._within = np.array([[1, 1]] * len(carried) + [[0, 1]] * (len(self._pairs) - len(carried)))
 
     def __call__(self, targets: Int[np.ndarray, "round lane"]) -> None:
         """Solve the instants of given indices; several threads may solve disjoint instants at once.
@@ -260,16 +260,16 @@ class RoundRunner:
         """
         self._check_sources()
         count, width = len(self._sources), self.width
-        within = targets.min(initial=0) >= 0 and targets.max(initial=-1) < count
-        if within and self._sources[targets[:1]].min(initial=0) < 0:
+        in_range = targets.min(initial=0) >= 0 and targets.max(initial=-1) < count
+        if in_range and self._sources[targets[:1]].min(initial=0) < 0:
             raise ValueError("sources in a round before the first one")
-        if targets.dtype != np.int64 or targets.shape[1:] != (width,) or not within:
+        if targets.dtype != np.int64 or targets.shape[1:] != (width,) or not in_range:
             raise ValueError(f"targets that are not {width} indices below {count} for each round")
         targets = np.ascontiguousarray(targets)
         memory = np.empty(len(self._blank) + LINE, np.uint8)  # a new block for each call, and so for each thread
-        first = -address_of(memory) % LINE
-        memory[first : first + len(self._blank)] = self._blank
-        start = address_of(memory) + first
+        margin = -address_of(memory) % LINE
+        memory[margin : margin + len(self._blank)] = self._blank
+        start = address_of(memory) + margin
         addresses, pairs = np.concatenate([self._common, start + self._begins]), self._pairs + start * self._within
         indices = address_of(self._sources), address_of(targets)
         self._run(address_of(addresses), address_of(pairs), *self._counts, *indices, len(targets))
@@ -281,10 +281,10 @@ class RoundRunner:
             raise ValueError(f"sources that are no indices below {self._known}")
 
 
-def _pairs(columns: Sequence[Column], begins: Iterator[int], width: int, least: int) -> list[tuple[int, int]]:
-    """Return pairs of addresses: each number of the first of `least` instants, and its vector in a round."""
+def _pairs(columns: Sequence[Column], offsets: Iterator[int], width: int, count: int) -> list[tuple[int, int]]:
+    """Return pairs of addresses: each number of the first of `count` instants, and its vector in a round."""
     result: list[tuple[int, int]] = []
-    for column, begin in zip(columns, begins, strict=False):
+    for column, offset in zip(columns, offsets, strict=False):
         if column.whole is not None:
-            result += zip(column.addresses(least), itertools.count(begin, width * ENTRY), strict=False)
+            result += zip(column.addresses(count), itertools.count(offset, width * ENTRY), strict=False)
     return result

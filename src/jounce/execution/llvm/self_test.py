@@ -73,17 +73,17 @@ def check() -> None:
         y = jax.lax.fori_loop(0, 3, turn, jnp.broadcast_to(x, (size, 1)))
         y = jax.lax.while_loop(lambda y: jnp.max(y) > 0.5, lambda y: 0.5 * y, y)
         square = x * x
-        own = [jnp.exp(x), jnp.log1p(square), jnp.arctan2(x, 1.0 + square), jnp.tanh(x), jnp.power(1.0 + square, x)]
-        return y, jnp.concatenate([*own, jnp.sqrt(square), jnp.floor(x)])
+        values = [jnp.exp(x), jnp.log1p(square), jnp.arctan2(x, 1.0 + square), jnp.tanh(x), jnp.power(1.0 + square, x)]
+        return y, jnp.concatenate([*values, jnp.sqrt(square), jnp.floor(x)])
 
     with own_settings():
         shared = (np.linspace(-0.1, 0.1, size * size).reshape(size, size),)
         lanes = (np.linspace(-2.0, 2.0, count)[None],)
-        one = (jax.ShapeDtypeStruct((1, 1), float),)
+        lane = (jax.ShapeDtypeStruct((1, 1), float),)
         expected = jax.vmap(lambda x: function(shared, (x[:, None],)), in_axes=1, out_axes=-1)(*lanes)
         for large in (None, 8):
-            binary, results = object_file(function, shared, one, {}, large=large)
-            result = Program(binary, (shared, one), results)(list(shared), list(lanes))
-            for mine, theirs in zip(result, expected, strict=True):
-                if not np.allclose(mine, theirs[:, 0], rtol=1e-12, atol=1e-14):
+            binary, results = object_file(function, shared, lane, {}, large=large)
+            result = Program(binary, (shared, lane), results)(list(shared), list(lanes))
+            for computed, reference in zip(result, expected, strict=True):
+                if not np.allclose(computed, reference[:, 0], rtol=1e-12, atol=1e-14):
                     raise AssertionError("the numbers are others")

@@ -30,17 +30,17 @@ def call_subroutine(code: Code, equation: Any, given: Sequence[Values], write: W
     program, values = equation.params["jaxpr"], [flat(array) for array in given]
     if any(kind_of(variable.aval.dtype) != "f" for variable in (*equation.invars, *equation.outvars)):
         return write(code, program, given)
-    key = program.jaxpr, tuple([None if v.constant is None else literal(v) for some in values for v in some])
-    if (known := code.subroutines.get(key)) is None:
-        known = code.subroutines[key] = _written(code, program, given, write)
-    pointers = [_pointer_to(code, some) for some, is_read in zip(values, known.is_read, strict=True) if is_read]
-    regions = [code.room(len(some), "f", lanes=True) if None in some else None for _, some in known.results]
+    key = program.jaxpr, tuple([None if v.constant is None else literal(v) for part in values for v in part])
+    if (subroutine := code.subroutines.get(key)) is None:
+        subroutine = code.subroutines[key] = _written(code, program, given, write)
+    pointers = [_pointer_to(code, part) for part, is_read in zip(values, subroutine.is_read, strict=True) if is_read]
+    regions = [code.room(len(part), "f", lanes=True) if None in part else None for _, part in subroutine.results]
     pointers += [region.pointer for region in regions if region is not None]
     if any(regions):
-        code.lines.append(f"call void {known.name}({', '.join(f'ptr {pointer}' for pointer in pointers)})")
+        code.lines.append(f"call void {subroutine.name}({', '.join(f'ptr {pointer}' for pointer in pointers)})")
     return [
-        filled(shape, [code.load(region, k) if region and value is None else value for k, value in enumerate(some)])
-        for region, (shape, some) in zip(regions, known.results, strict=True)
+        filled(shape, [code.load(region, k) if region and value is None else value for k, value in enumerate(part)])
+        for region, (shape, part) in zip(regions, subroutine.results, strict=True)
     ]
 
 

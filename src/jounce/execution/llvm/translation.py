@@ -70,12 +70,12 @@ def translate(
     plan = code.plans.get(program)
     if plan is None:
         plan = code.plans[program] = plan_of(program, *((DEFERRED, READING) if code.large is not None else ((), ())))
-    known: dict[Any, Array] = {}
+    arrays: dict[Any, Array] = {}
     read_last: dict[Region, int] = {}  # the last operation that reads each memory
-    now = 0
+    position = 0
 
     def noted(variable: Any, array: Array) -> None:
-        known[variable] = array
+        arrays[variable] = array
         for region in regions_of([array]) if isinstance(array, InMemory) else ():
             read_last[region] = max(read_last.get(region, -1), plan.last.get(variable, -1))
 
@@ -83,24 +83,24 @@ def translate(
         if isinstance(variable, Literal):
             aval: Any = variable.aval
             return constants(np.asarray(variable.val, aval.dtype))
-        return known[variable]
+        return arrays[variable]
 
     for variable, array in zip((*program.constvars, *program.invars), (*constants_, *given), strict=True):
         noted(variable, array)
     for variable, value in plan.constants.items():
         noted(variable, constants(value))
-    around = code.sparse
-    with np.errstate(all="ignore"), code.used(lambda region: read_last.get(region, -1) > now):
-        for now, operation in enumerate(plan.operations):
+    outer_sparse = code.sparse
+    with np.errstate(all="ignore"), code.used(lambda region: read_last.get(region, -1) > position):
+        for position, operation in enumerate(plan.operations):
             inputs = [read(variable) for variable in operation.invars]
-            before, code.sparse = len(code.taken), around or operation.sparse
-            result = _results(code, operation, inputs, delayed=now in plan.delayed)
+            before, code.sparse = len(code.taken), outer_sparse or operation.sparse
+            result = _results(code, operation, inputs, delayed=position in plan.delayed)
             for variable, values in zip(operation.outvars, result, strict=True):
                 noted(variable, _checked(values, variable.aval))
             if code.large is not None:
                 release_all_but(code, code.taken[before:], result)
-                forget_variables(code, known, plan.ends.get(now, ()))
-        code.sparse = around
+                forget_variables(code, arrays, plan.ends.get(position, ()))
+        code.sparse = outer_sparse
         results = [read(variable) for variable in plan.results]
         return results if late else [stored(code, x) if isinstance(x, Deferred) else x for x in results]
 
@@ -112,8 +112,8 @@ def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool
         given = [stored(code, array) if isinstance(array, Deferred) else array for array in given]
     if (control := _CONTROL.get(name)) is not None:
         return control(code, equation, given)
-    stays = code.large is not None and any(is_large(code, variable.aval) for variable in equation.outvars)
-    in_memory = stays or not all(isinstance(array, np.ndarray) for array in given)
+    has_large = code.large is not None and any(is_large(code, variable.aval) for variable in equation.outvars)
+    in_memory = has_large or not all(isinstance(array, np.ndarray) for array in given)
     if in_memory and (rule := STORED.get(name)) is not None:
         result = [settled(code, array) for array in rule(code, equation, given)]
         return [stored(code, x) if isinstance(x, Deferred) and not delayed else x for x in result]
@@ -151,32 +151,32 @@ def _number(code: Code, array: Array) -> Value:
 
 def _closed(code: Code, closed: Any, *given: Sequence[Array], late: bool = False) -> list[Array]:
     numbers = [constants(number) for number in closed.consts]
-    return translate(code, closed.jaxpr, numbers, [array for some in given for array in some], late=late)
+    return translate(code, closed.jaxpr, numbers, [array for group in given for array in group], late=late)
 
 
-def _until_settled(code: Code, known: Any, attempt: Callable[[Any], tuple[Any, Any]]) -> Any:
+def _until_settled(code: Code, assumptions: Any, attempt: Callable[[Any], tuple[Any, Any]]) -> Any:
     """Return the results of an attempt to emit code whose assumptions hold, such as which arrays differ by lane.
 
     Parameters
     ----------
-    known : list of bool, or more
+    assumptions : list of bool, or more
         Initial assumptions.
     attempt : callable
         Emits code under assumptions, and returns those that hold, possibly weaker ones, and its results.
     """
     while True:
         mark = code.mark()
-        settled_as, results = attempt(known)
-        if settled_as == known:
+        settled_as, results = attempt(assumptions)
+        if settled_as == assumptions:
             return results
         code.back_to(mark)
-        known = settled_as
+        assumptions = settled_as
 
 
-def _in_lanes(arrays: Sequence[Array], already: Sequence[bool] | None = None) -> list[bool]:
+def _in_lanes(arrays: Sequence[Array], previous: Sequence[bool] | None = None) -> list[bool]:
     """Return which arrays have numbers that differ from lane to lane, or did so already."""
-    already = [False] * len(arrays) if already is None else already
-    return [before or any_lanes([array]) for before, array in zip(already, arrays, strict=True)]
+    previous = [False] * len(arrays) if previous is None else previous
+    return [before or any_lanes([array]) for before, array in zip(previous, arrays, strict=True)]
 
 
 def _likely(code: Code, arrays: Sequence[Array], avals: Sequence[Any]) -> list[bool]:
@@ -193,10 +193,10 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     """Emit a loop that each lane leaves when its condition no longer holds."""
     p = equation.params
     split = p["cond_nconsts"], p["cond_nconsts"] + p["body_nconsts"]
-    condition, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
+    condition, captured, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
 
-    def attempt(known: tuple[list[bool], list[dict[int, Value]]]) -> tuple[Any, list[Array]]:
-        lanes, invariants = known
+    def attempt(assumptions: tuple[list[bool], list[dict[int, Value]]]) -> tuple[Any, list[Array]]:
+        lanes, invariants = assumptions
         state = LoopVariables(code, avals, lanes, invariants)
         state.store(start)
         head, body, end = code.label(), code.label(), code.label()
@@ -204,15 +204,15 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
         code.begin(head)
         with code.scope(), state.held():
             before = state.load()
-            with code.used(among([*condition, *needed, *before])):
+            with code.used(among([*condition, *captured, *before])):
                 goes = code.among_active(_number(code, _closed(code, p["cond_jaxpr"], condition, before)[0]))
             if goes.lanes and not all(lanes):  # a lane that has left keeps its own values
                 return ([True] * len(lanes), invariants), []
             code.branch(code.anywhere(goes), body, end)
             code.begin(body)
-            live = [*condition, *needed, *(before if goes.lanes else ())]
+            live = [*condition, *captured, *(before if goes.lanes else ())]
             with code.scope(goes if goes.lanes else None), code.used(among(live)), code.changing(state.regions):
-                after = _closed(code, p["body_jaxpr"], needed, before, late=True)
+                after = _closed(code, p["body_jaxpr"], captured, before, late=True)
                 if goes.lanes:
                     after = chosen(code, goes, after, state.load(new=after))
                 state.store(after)
@@ -229,21 +229,21 @@ def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Emit a loop of known length over the first axis of arrays."""
     p = equation.params
     fixed, carry = sizes_of_scan(equation)
-    needed, start, rows = given[:fixed], given[fixed : fixed + carry], given[fixed + carry :]
-    made = [variable.aval for variable in equation.outvars[len(start) :]]
+    captured, start, rows = given[:fixed], given[fixed : fixed + carry], given[fixed + carry :]
+    types = [variable.aval for variable in equation.outvars[len(start) :]]
     if p["length"] == 0:
-        return [*start, *(np.empty(aval.shape, object) for aval in made)]
-    most = MOST_UNROLLED if code.large is None else MOST_UNROLLED_IN_MEMORY
+        return [*start, *(np.empty(aval.shape, object) for aval in types)]
+    line_limit = MOST_UNROLLED if code.large is None else MOST_UNROLLED_IN_MEMORY
     if code.large is None and _needs_known_indices(p["jaxpr"].jaxpr):
-        most = code.most
-    if (unrolled := _unrolled(code, equation, needed, start, rows, most)) is not None:
+        line_limit = code.most
+    if (unrolled := _unrolled(code, equation, captured, start, rows, line_limit)) is not None:
         return unrolled
     mark = code.mark()
     try:
-        return _rolled(code, equation, needed, start, rows)
+        return _rolled(code, equation, captured, start, rows)
     except UnsupportedOperationError:  # of indices that change from iteration to iteration
         code.back_to(mark)
-        if (unrolled := _unrolled(code, equation, needed, start, rows, code.most)) is None:
+        if (unrolled := _unrolled(code, equation, captured, start, rows, code.most)) is None:
             raise
         return unrolled
 
@@ -258,17 +258,17 @@ def _needs_known_indices(program: Any) -> bool:
 
 
 def _rolled(
-    code: Code, equation: Any, needed: Sequence[Array], start: Sequence[Array], rows: Sequence[Array]
+    code: Code, equation: Any, captured: Sequence[Array], start: Sequence[Array], rows: Sequence[Array]
 ) -> list[Array]:
     """Emit a loop of known length as a loop."""
     p, size = equation.params, len(start)
     made = [variable.aval for variable in equation.outvars[size:]]
     last = code.constant(p["length"] - 1, "l")
 
-    def attempt(known: tuple[list[bool], list[dict[int, Value]]]) -> tuple[Any, list[Array]]:
-        lanes, invariants = known
+    def attempt(assumptions: tuple[list[bool], list[dict[int, Value]]]) -> tuple[Any, list[Array]]:
+        lanes, invariants = assumptions
         state = LoopVariables(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size], invariants)
-        written, counter = LoopVariables(code, made, lanes[size:]), code.room(1, "l", lanes=False)
+        output_rows, counter = LoopVariables(code, made, lanes[size:]), code.room(1, "l", lanes=False)
         state.store(start)
         code.store(counter, 0, code.constant(0, "l"))
         homes = [stored(code, array) if array.size else array for array in rows]
@@ -277,51 +277,51 @@ def _rolled(
         code.begin(body)
         with (
             code.scope(),
-            code.used(among([*needed, *homes])),
+            code.used(among([*captured, *homes])),
             state.held(),
-            written.held(),
+            output_rows.held(),
             code.changing(state.regions),
         ):
             count = code.load(counter, 0)
-            at = code.arithmetic("sub", last, count) if p["reverse"] else count
-            taken = [row(code, array, at) if array.size else np.empty(array.shape[1:], object) for array in homes]
-            results = _closed(code, p["jaxpr"], needed, state.load(), taken, late=True)
-            for region, array in zip(written.regions, results[size:], strict=True):
+            index = code.arithmetic("sub", last, count) if p["reverse"] else count
+            inputs = [row(code, array, index) if array.size else np.empty(array.shape[1:], object) for array in homes]
+            results = _closed(code, p["jaxpr"], captured, state.load(), inputs, late=True)
+            for region, array in zip(output_rows.regions, results[size:], strict=True):
                 if array.size:
-                    put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
-            written.note_rows(results[size:], p["length"])
+                    put(code, contiguous(region, array.shape, further(code, 0, index, array.size)), array)
+            output_rows.note_rows(results[size:], p["length"])
             state.store(results[:size])  # last, since other results may be parts of the carried arrays
             release_arrays(code, results)
             code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
             code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
         code.begin(end)
-        remaining = [*map(still_invariant, invariants, results[:size])]
-        return (_in_lanes(results, lanes), remaining), [*state.load(), *written.load()]
+        still_constant = [*map(still_invariant, invariants, results[:size])]
+        return (_in_lanes(results, lanes), still_constant), [*state.load(), *output_rows.load()]
 
     likely = [*_likely(code, start, [variable.aval for variable in equation.outvars[:size]]), *_likely_made(code, made)]
     return _until_settled(code, (likely, [invariants_of(code, x) for x in start]), attempt)
 
 
 def _unrolled(
-    code: Code, equation: Any, needed: Sequence[Array], start: Sequence[Array], rows: Sequence[Array], most: int
+    code: Code, equation: Any, captured: Sequence[Array], start: Sequence[Array], rows: Sequence[Array], limit: int
 ) -> list[Array] | None:
-    """Return the results of an unrolled loop; None if it takes more than `most` lines.
+    """Return the results of an unrolled loop; None if it takes more than `limit` lines.
 
     It is given up early if the iterations so far, of which the first are the longest, are too long.
     """
     p, mark, before = equation.params, code.mark(), len(code.lines)
-    size, result, live = len(start), {}, regions_of([*needed, *rows])
+    size, result, live = len(start), {}, regions_of([*captured, *rows])
     for k in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
         with code.used(live.__contains__):
-            results = _closed(code, p["jaxpr"], needed, start, [row(code, array, k) for array in rows])
+            results = _closed(code, p["jaxpr"], captured, start, [row(code, array, k) for array in rows])
         start, result[k] = results[:size], results[size:]
         live |= regions_of(result[k])
-        lines, left = len(code.lines) - before, p["length"] - len(result)
-        if p["length"] > 1 and lines + lines / len(result) / HOPE * left > most:
+        lines, remaining = len(code.lines) - before, p["length"] - len(result)
+        if p["length"] > 1 and lines + lines / len(result) / HOPE * remaining > limit:
             code.back_to(mark)
             return None
-    made = [[result[k][index] for k in range(p["length"])] for index in range(len(equation.outvars) - size)]
-    return [*start, *(_stacked(code, parts) for parts in made)]
+    columns = [[result[k][index] for k in range(p["length"])] for index in range(len(equation.outvars) - size)]
+    return [*start, *(_stacked(code, parts) for parts in columns)]
 
 
 def _stacked(code: Code, parts: Sequence[Array]) -> Array:
@@ -336,14 +336,14 @@ def _stacked(code: Code, parts: Sequence[Array]) -> Array:
 
 def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     """Emit the branches of a conditional, of which each lane takes one: all that any lane takes are run."""
-    ways, which, inputs = equation.params["branches"], _number(code, given[0]), given[1:]
-    which = code.converted(which, "i") if which.kind == "b" else which
-    if len(ways) == 1 or which.constant is not None:
-        return _closed(code, ways[min(max(int(which.constant or 0), 0), len(ways) - 1)], inputs)
-    left = unchanged([way.jaxpr for way in ways], inputs)
-    changing = [k for k, array in enumerate(left) if array is None]
-    avals = [equation.outvars[k].aval for k in changing]
-    in_place = changed_in_place(code, which, ways[0].jaxpr, inputs, changing)
+    ways, branch, inputs = equation.params["branches"], _number(code, given[0]), given[1:]
+    branch = code.converted(branch, "i") if branch.kind == "b" else branch
+    if len(ways) == 1 or branch.constant is not None:
+        return _closed(code, ways[min(max(int(branch.constant or 0), 0), len(ways) - 1)], inputs)
+    passed_through = unchanged([way.jaxpr for way in ways], inputs)
+    changed_indices = [k for k, array in enumerate(passed_through) if array is None]
+    avals = [equation.outvars[k].aval for k in changed_indices]
+    in_place = changed_in_place(code, branch, ways[0].jaxpr, inputs, changed_indices)
     homes = Homes(inputs)
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
@@ -351,32 +351,32 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
         for k, way in enumerate(ways):
             homes.restore()
             word = "le" if k == 0 else "ge" if k == len(ways) - 1 else "eq"
-            taken = code.among_active(code.compare(word, which, code.constant(k, which.kind)))
-            begin, end = code.label(), code.label()
-            code.branch(code.anywhere(taken), begin, end)
-            code.begin(begin)
+            taken = code.among_active(code.compare(word, branch, code.constant(k, branch.kind)))
+            start, end = code.label(), code.label()
+            code.branch(code.anywhere(taken), start, end)
+            code.begin(start)
             with (
                 code.scope(taken if taken.lanes else None),
                 code.used(among(inputs if k < len(ways) - 1 or taken.lanes else [])),
             ):
-                every = _closed(code, way, inputs)
-                made = [every[k] for k in changing]
-                differing = _in_lanes(made, differing)
-                if which.lanes and k > 0:
-                    made = chosen(code, taken, made, results.load(k, made))
-                results.store(made)
+                results_of_branch = _closed(code, way, inputs)
+                changed_results = [results_of_branch[k] for k in changed_indices]
+                differing = _in_lanes(changed_results, differing)
+                if branch.lanes and k > 0:
+                    changed_results = chosen(code, taken, changed_results, results.load(k, changed_results))
+                results.store(changed_results)
             code.jump(end)
             code.begin(end)
         results.note_invariants(len(ways))
         return differing, results.load()
 
     likely = [
-        which.lanes or likely or region is not None
+        branch.lanes or likely or region is not None
         for likely, region in zip(_likely_made(code, avals), in_place, strict=True)
     ]
     changed = iter(_until_settled(code, likely, attempt))
     homes.forget(in_place)
-    return [next(changed) if array is None else array for array in left]
+    return [next(changed) if array is None else array for array in passed_through]
 
 
 def _subroutine(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:

@@ -53,10 +53,10 @@ class ProgramFolder:
 
     def get(self, key: str) -> bytes | None:
         """Return the program of this key, or None."""
-        whole, size = self._folder.read(key + ENDING), hashlib.sha256().digest_size
-        if whole is not None and hashlib.sha256(whole[size:]).digest() == whole[:size]:
-            return whole[size:]
-        if whole is not None:
+        content, size = self._folder.read(key + ENDING), hashlib.sha256().digest_size
+        if content is not None and hashlib.sha256(content[size:]).digest() == content[:size]:
+            return content[size:]
+        if content is not None:
             self.drop(key)
         return None
 
@@ -81,6 +81,6 @@ class ProgramFolder:
                 break
             total -= size
             self._folder.remove(name)
-        for written, _, name in self._folder.files(PrivateFolder.SCRATCH):
-            if written < time.time() - ABANDONED:
+        for modified, _, name in self._folder.files(PrivateFolder.SCRATCH):
+            if modified < time.time() - ABANDONED:
                 self._folder.remove(name)

@@ -170,8 +170,8 @@ def loaded_or_made(key: str | None, make: Callable[[], tuple[Any, ...]], load: C
             return load(*unpacked(stored))
         except Exception:  # noqa: BLE001 - a program with any fault is made again
             store.drop(key)
-    made = make()
+    parts = make()
     if store is not None and key is not None:
         with suppress(pickle.PicklingError, TypeError, AttributeError):
-            store.put(key, packed(made))
-    return load(*made)
+            store.put(key, packed(parts))
+    return load(*parts)

@@ -49,8 +49,8 @@ def reduction(operation: str) -> Rule:
     def rule(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
         axes, array = equation.params["axes"], given[0]
         remaining = [axis for axis in range(array.ndim) if axis not in axes]
-        together = int(np.prod([array.shape[axis] for axis in axes]))
-        rows = array.transpose(*remaining, *axes).reshape(*(array.shape[axis] for axis in remaining), together)
+        count = int(np.prod([array.shape[axis] for axis in axes]))
+        rows = array.transpose(*remaining, *axes).reshape(*(array.shape[axis] for axis in remaining), count)
         result, kind = np.empty(rows.shape[:-1], object), kind_of(equation.outvars[0].aval.dtype)
         for index in np.ndindex(result.shape):
             result[index] = _combined(code, operation, flat(rows[index]), kind)
@@ -65,12 +65,12 @@ def extreme(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
     kind, rows = kind_of(equation.params["index_dtype"]), np.moveaxis(given[0], axis, -1)
     result = np.empty(rows.shape[:-1], object)
     for index in np.ndindex(result.shape):
-        best, at = rows[index][0], code.constant(0, kind)
+        best, position = rows[index][0], code.constant(0, kind)
         for k, value in enumerate(flat(rows[index])[1:], 1):
             better = is_better(code, equation.primitive.name, value, best)
             best = code.select(better, value, best)
-            at = code.select(better, code.constant(k, kind), at)
-        result[index] = at
+            position = code.select(better, code.constant(k, kind), position)
+        result[index] = position
     return [result]
 
 
@@ -79,8 +79,8 @@ def is_better(code: Code, operation: str, value: Value, best: Value) -> Value:
     better = code.compare("gt" if operation == "argmax" else "lt", value, best)
     if value.kind != "f":
         return better
-    nan, known = code.compare("ne", value, value), code.compare("eq", best, best)
-    return code.logic("or", better, code.logic("and", nan, known))
+    nan, is_number = code.compare("ne", value, value), code.compare("eq", best, best)
+    return code.logic("or", better, code.logic("and", nan, is_number))
 
 
 def cumulative(operation: str) -> Rule:

@@ -28,10 +28,10 @@ def part(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
 def broadcast(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
     """Return an array repeated along new axes and those of length one."""
     shape, axes = equation.params["shape"], equation.params["broadcast_dimensions"]
-    placed = [1] * len(shape)
+    expanded_shape = [1] * len(shape)
     for axis, size in zip(axes, given[0].shape, strict=True):
-        placed[axis] = size
-    return [np.broadcast_to(given[0].reshape(placed), shape)]
+        expanded_shape[axis] = size
+    return [np.broadcast_to(given[0].reshape(expanded_shape), shape)]
 
 
 def tile(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
@@ -74,15 +74,15 @@ def pad(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
     """Return an array padded before, after and between its elements; negative padding removes elements."""
     array, filler = given
     result = np.full(equation.outvars[0].aval.shape, filler.item(), object)
-    indices, taken = [], []
-    for size, whole, (low, _high, between) in zip(
+    indices, sources = [], []
+    for size, length, (low, _high, gap) in zip(
         array.shape, result.shape, equation.params["padding_config"], strict=True
     ):
-        at = low + np.arange(size) * (between + 1)
-        inside = np.flatnonzero((at >= 0) & (at < whole))
-        indices.append(at[inside])
-        taken.append(inside)
-    result[np.ix_(*indices)] = array[np.ix_(*taken)]
+        positions = low + np.arange(size) * (gap + 1)
+        inside = np.flatnonzero((positions >= 0) & (positions < length))
+        indices.append(positions[inside])
+        sources.append(inside)
+    result[np.ix_(*indices)] = array[np.ix_(*sources)]
     return [result]
 
 
@@ -116,24 +116,24 @@ def _element(code: Code, index: Value, *values: Value) -> Value:
     return result
 
 
-def _rows(code: Code, whole: Values, index: Value, shape: Sequence[int]) -> Values:
+def _rows(code: Code, array: Values, index: Value, shape: Sequence[int]) -> Values:
     """Return rows of an array from an index in bounds on, the same for all lanes, loaded from memory."""
-    region, first = in_memory(code, flat(whole))
-    start = code.arithmetic("mul", code.converted(index, "l"), code.constant(int(np.prod(whole.shape[1:])), "l"))
+    region, first = in_memory(code, flat(array))
+    start = code.arithmetic("mul", code.converted(index, "l"), code.constant(int(np.prod(array.shape[1:])), "l"))
     offsets = (code.constant(first + k, "l") for k in range(int(np.prod(shape))))
     return filled(shape, [code.load(region, code.arithmetic("add", start, offset)) for offset in offsets])
 
 
-def within(code: Code, index: Value, least: int, most: int) -> Value:
+def within(code: Code, index: Value, low: int, high: int) -> Value:
     """Return an index clamped to bounds."""
-    below = code.arithmetic("min", index, code.constant(most, index.kind))
-    return code.arithmetic("max", below, code.constant(least, index.kind))
+    bounded = code.arithmetic("min", index, code.constant(high, index.kind))
+    return code.arithmetic("max", bounded, code.constant(low, index.kind))
 
 
 def clamped_starts(code: Code, shape: Sequence[int], sizes: Sequence[int], starts: Sequence[Values]) -> list[Value]:
     """Return the start of a part of an array along each axis, clamped so that the part is in bounds."""
     return [
-        within(code, start.item(), 0, whole - size) for whole, size, start in zip(shape, sizes, starts, strict=True)
+        within(code, start.item(), 0, length - size) for length, size, start in zip(shape, sizes, starts, strict=True)
     ]
 
 
@@ -160,32 +160,32 @@ def dynamic_slice(code: Code, equation: Any, given: Sequence[Values]) -> Sequenc
 def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
     """Return an array with a part replaced from start indices on, clamped so that the part is in bounds."""
     array, new, *starts = given
-    largest_starts = [whole - size for whole, size in zip(array.shape, new.shape, strict=True)]
+    largest_starts = [length - size for length, size in zip(array.shape, new.shape, strict=True)]
     indices = clamped_starts(code, array.shape, new.shape, starts)
-    moving = [axis for axis, index in enumerate(indices) if index.constant is None]
-    firsts = [
-        range(most + 1) if index.constant is None else (int(index.constant),)
-        for index, most in zip(indices, largest_starts, strict=True)
+    variable_axes = [axis for axis, index in enumerate(indices) if index.constant is None]
+    start_ranges = [
+        range(largest + 1) if index.constant is None else (int(index.constant),)
+        for index, largest in zip(indices, largest_starts, strict=True)
     ]
     result = array.copy()
-    for first in itertools.product(*firsts):
+    for start in itertools.product(*start_ranges):
         is_target = code.constant(True)
-        for axis in moving:
-            number = code.constant(first[axis], indices[axis].kind)
+        for axis in variable_axes:
+            number = code.constant(start[axis], indices[axis].kind)
             is_target = code.logic("and", is_target, code.compare("eq", indices[axis], number))
         for offset in np.ndindex(new.shape):
-            position = tuple(a + b for a, b in zip(first, offset, strict=True))
+            position = tuple(a + b for a, b in zip(start, offset, strict=True))
             result[position] = code.select(is_target, new.item(offset), result.item(position))
     return [result]
 
 
 def _known(indices: Values) -> tuple[np.ndarray, int | None]:
     """Return indices as numbers, zero if not constant, and the column with indices that are not constant, if any."""
-    known = np.vectorize(lambda value: 0 if value.constant is None else int(value.constant), otypes=[int])(indices)
-    moving = [k for k in range(indices.shape[-1]) if any(value.constant is None for value in flat(indices[..., k]))]
-    if len(moving) > 1:
+    numbers = np.vectorize(lambda value: 0 if value.constant is None else int(value.constant), otypes=[int])(indices)
+    varying = [k for k in range(indices.shape[-1]) if any(value.constant is None for value in flat(indices[..., k]))]
+    if len(varying) > 1:
         raise UnsupportedOperationError("indices of which more than one are not known")
-    return known, moving[0] if moving else None
+    return numbers, varying[0] if varying else None
 
 
 def _with_column(indices: np.ndarray, column: int, number: int) -> np.ndarray:
@@ -199,19 +199,19 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
     """Return parts of an array at indices."""
     array, indices = given
     windows, dtype = windows_of(equation), equation.outvars[0].aval.dtype
-    known, axis = _known(indices)
+    numbers, axis = _known(indices)
     values = [*flat(array), code.constant(filler(equation.params, dtype), kind_of(dtype))]
     if axis is None:
-        return [_taken(values, windows.positions(known, array.shape))]
-    along = windows.named[axis]
-    size, width = array.shape[along], windows.sizes[along]
+        return [_taken(values, windows.positions(numbers, array.shape))]
+    array_axis = windows.named[axis]
+    size, width = array.shape[array_axis], windows.sizes[array_axis]
     # from one before to one beyond the ends; or only windows inside, so that numbers in memory need not be copied
-    least, most = (-1, size) if windows.drop else (0, size - width)
-    tables = [windows.positions(_with_column(known, axis, k), array.shape) for k in range(least, most + 1)]
+    low, high = (-1, size) if windows.drop else (0, size - width)
+    tables = [windows.positions(_with_column(numbers, axis, k), array.shape) for k in range(low, high + 1)]
     result = np.empty(tables[0].shape, object)
     for position in np.ndindex(result.shape):
-        index = within(code, indices[(*(position[k] for k in windows.batch), axis)], least, most)
-        index = code.arithmetic("add", index, code.constant(-least, index.kind))
+        index = within(code, indices[(*(position[k] for k in windows.batch), axis)], low, high)
+        index = code.arithmetic("add", index, code.constant(-low, index.kind))
         result[position] = _element(code, index, *(values[table[position]] for table in tables))
     return [result]
 
@@ -234,7 +234,7 @@ def filler(params: Mapping[str, Any], dtype: Any) -> Any:
 def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
     """Return an array with numbers replaced at indices, or increased by the updates."""
     array, indices, updates = given
-    known, moving = _known(indices)
+    numbers, column = _known(indices)
     if not updates.size or not array.size:
         return [array]
     windows, add, result = windows_of(equation), equation.primitive.name == "scatter-add", flat(array)
@@ -244,15 +244,15 @@ def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
             new = code.arithmetic("add", result[index], value) if add else value
             result[index] = code.select(is_target, new, result[index])
 
-    if moving is None:
-        for index, value in zip(windows.positions(known, array.shape).ravel().tolist(), flat(updates), strict=True):
+    if column is None:
+        for index, value in zip(windows.positions(numbers, array.shape).ravel().tolist(), flat(updates), strict=True):
             put(index, value, code.constant(True))
         return [filled(array.shape, result)]
-    along = windows.named[moving]
-    starts = range(array.shape[along] - windows.sizes[along] + 1)
-    tables = [windows.positions(_with_column(known, moving, start), array.shape) for start in starts]
+    array_axis = windows.named[column]
+    starts = range(array.shape[array_axis] - windows.sizes[array_axis] + 1)
+    tables = [windows.positions(_with_column(numbers, column, start), array.shape) for start in starts]
     for position in np.ndindex(updates.shape):
-        index = indices[(*(position[k] for k in windows.batch), moving)]
+        index = indices[(*(position[k] for k in windows.batch), column)]
         index = index if windows.drop else within(code, index, starts[0], starts[-1])
         for start, table in zip(starts, tables, strict=True):
             is_target = code.compare("eq", index, code.constant(start, index.kind))

@@ -58,7 +58,7 @@ def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     indices = [[_index_among(read, part, aval.shape) for part in operand.given] for operand in operands]
 
     def body(values: Sequence[Value]) -> Value:
-        numbers = [x.body([values[k] for k in its]) for x, its in zip(operands, indices, strict=True)]
+        numbers = [x.body([values[k] for k in members]) for x, members in zip(operands, indices, strict=True)]
         return rule(code, equation, [filled((), [number]) for number in numbers])[0].item()
 
     return [Deferred(tuple(read), kind_of(aval.dtype), body, any(operand.parts for operand in operands))]
@@ -86,7 +86,7 @@ def _moved(rule: Rule) -> StoredRule:
 
     def moved(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
         def views(array: Stored) -> list[Stored]:
-            return views_of(code, array, lambda whole: rule(code, equation, [whole]))
+            return views_of(code, array, lambda values: rule(code, equation, [values]))
 
         (array,) = given
         if isinstance(array, Deferred) and array.size == equation.outvars[0].aval.size:
@@ -186,33 +186,33 @@ def _disjoint(code: Code, array: InMemory, changed: Stored) -> InMemory:
 
 
 def _window_at(
-    code: Code, windows: Windows, array: Stored, indices: Stored, which: Sequence[int | Value]
+    code: Code, windows: Windows, array: Stored, indices: Stored, window: Sequence[int | Value]
 ) -> tuple[Stored, Value]:
     """Return a window clamped into an array, and whether it was inside or is clamped by definition."""
     first, inside = array.first, code.constant(True)
     for k, axis in enumerate(windows.named):
-        where = _at(code, indices, range(indices.ndim), (*which, k), indices.first)
-        index = code.converted(without_home(code.load(indices.region, where)), "l")
+        position = _at(code, indices, range(indices.ndim), (*window, k), indices.first)
+        index = code.converted(without_home(code.load(indices.region, position)), "l")
         remaining = within(code, index, 0, array.shape[axis] - windows.sizes[axis])
         inside = code.logic("and", inside, code.compare("eq", remaining, index))
         first = further(code, first, remaining, array.strides[axis])
-    first = _at(code, array, [*windows.batching], [which[k] for k in windows.batching.values()], first)
-    shape, strides = (tuple(its[axis] for axis in windows.remaining) for its in (windows.sizes, array.strides))
+    first = _at(code, array, [*windows.batching], [window[k] for k in windows.batching.values()], first)
+    shape, strides = (tuple(values[axis] for axis in windows.remaining) for values in (windows.sizes, array.strides))
     return Stored(array.region, shape, strides, first), inside if windows.drop else code.constant(True)
 
 
-def _part_of(code: Code, windows: Windows, whole: Stored, which: Sequence[int | Value]) -> Stored:
+def _part_of(code: Code, windows: Windows, array: Stored, window: Sequence[int | Value]) -> Stored:
     """Return the part of the array of all windows that belongs to one window."""
-    first = _at(code, whole, windows.batch, which, whole.first)
-    shape, strides = (tuple(its[k] for k in windows.offsets) for its in (whole.shape, whole.strides))
-    return Stored(whole.region, shape, strides, first)
+    first = _at(code, array, windows.batch, window, array.first)
+    shape, strides = (tuple(values[k] for k in windows.offsets) for values in (array.shape, array.strides))
+    return Stored(array.region, shape, strides, first)
 
 
 def _at(
-    code: Code, array: Stored, axes: Sequence[int], which: Sequence[int | Value], first: int | Value
+    code: Code, array: Stored, axes: Sequence[int], indices: Sequence[int | Value], first: int | Value
 ) -> int | Value:
     """Return the position at indices along some axes of an array, from the position `first`."""
-    for axis, index in zip(axes, which, strict=True):
+    for axis, index in zip(axes, indices, strict=True):
         first = further(code, first, index, array.strides[axis])
     return first
 
@@ -232,21 +232,21 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     array, indices, windows = stored(code, given[0]), stored(code, given[1]), windows_of(equation)
     aval = equation.outvars[0].aval
     result = new_storage(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
-    beyond = stored(code, filled((), [code.constant(filler(equation.params, aval.dtype), result.kind)]))
+    fill_value = stored(code, filled((), [code.constant(filler(equation.params, aval.dtype), result.kind)]))
 
-    def window(which: list[int | Value]) -> None:
-        source, inside = _window_at(code, windows, array, indices, which)
-        target = _part_of(code, windows, result, which)
+    def window(index: list[int | Value]) -> None:
+        source, inside = _window_at(code, windows, array, indices, index)
+        target = _part_of(code, windows, result, index)
         if inside.constant is not None:
             put(code, target, source)
             return
-        other = spread(beyond, source.shape, ())
+        other = spread(fill_value, source.shape, ())
         nest(code, [source, other], [target], lambda values: [code.select(inside, *values)])
 
     if array.size:
         _each_window(code, [result.shape[axis] for axis in windows.batch], window)
     else:
-        put(code, result, spread(beyond, result.shape, ()))
+        put(code, result, spread(fill_value, result.shape, ()))
     return [result]
 
 
@@ -258,15 +258,15 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
     if not updates.size or not result.size:
         return [result]
 
-    def window(which: list[int | Value]) -> None:
-        target, inside = _window_at(code, windows, result, indices, which)
+    def window(index: list[int | Value]) -> None:
+        target, inside = _window_at(code, windows, result, indices, index)
 
         def body(values: Sequence[Value]) -> Sequence[Value]:
             old, value = values
-            changed = code.arithmetic("add", old, value) if add else value
-            return [code.select(inside, changed, old)]
+            new = code.arithmetic("add", old, value) if add else value
+            return [code.select(inside, new, old)]
 
-        nest(code, [target, _part_of(code, windows, updates, which)], [target], body, adds=True)
+        nest(code, [target, _part_of(code, windows, updates, index)], [target], body, adds=True)
 
     _each_window(code, [updates.shape[axis] for axis in windows.batch], window)
     return [result]

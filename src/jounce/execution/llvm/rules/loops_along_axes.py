@@ -52,16 +52,16 @@ def _in_vectors(code: Code, operation: str, array: Deferred) -> list[Deferred]:
     row = array.in_shape((array.size,))
     if row is None or row.size < 2 * code.width:
         return [array]
-    left = row.size % code.width
-    whole = (row.size // code.width, code.width)
-    rows = row.viewed(lambda x: between(code, x, 0, 0, row.size - left)).in_shape(whole)
-    rest = row.viewed(lambda x: between(code, x, 0, row.size - left, left))
+    remainder = row.size % code.width
+    shape = (row.size // code.width, code.width)
+    rows = row.viewed(lambda x: between(code, x, 0, 0, row.size - remainder)).in_shape(shape)
+    tail = row.viewed(lambda x: between(code, x, 0, row.size - remainder, remainder))
     if rows is None:
         return [array]
-    most = new_storage(code, (code.width,), row.kind, lanes=False)
-    fill(code, most, code.constant(nothing(operation, row.kind), row.kind))
-    _gathered(code, operation, spread(most, whole, (1,)), rows)
-    return [as_read(most), rest]
+    accumulator = new_storage(code, (code.width,), row.kind, lanes=False)
+    fill(code, accumulator, code.constant(nothing(operation, row.kind), row.kind))
+    _gathered(code, operation, spread(accumulator, shape, (1,)), rows)
+    return [as_read(accumulator), tail]
 
 
 REDUCTIONS = {f"reduce_{name}": reduction(operation) for name, operation in REDUCED.items()}
@@ -110,8 +110,8 @@ def dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     total = spread(result, shape, range(end))
 
     def body(values: Sequence[Value]) -> Sequence[Value]:
-        known, p, q = (code.converted(value, result.kind) for value in values)
-        return [code.arithmetic("add", known, code.arithmetic("mul", p, q))]
+        accumulated, p, q = (code.converted(value, result.kind) for value in values)
+        return [code.arithmetic("add", accumulated, code.arithmetic("mul", p, q))]
 
     nest(code, [total, a, b], [total], body, adds=True)
     return [result]

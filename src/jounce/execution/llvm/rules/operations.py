@@ -91,8 +91,8 @@ def _power(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
 
 
 def _round(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    away = equation.params["rounding_method"] == jax.lax.RoundingMethod.AWAY_FROM_ZERO
-    return [each(lambda a: code.intrinsic("round" if away else "roundeven", a), given[0])]
+    from_zero = equation.params["rounding_method"] == jax.lax.RoundingMethod.AWAY_FROM_ZERO
+    return [each(lambda a: code.intrinsic("round" if from_zero else "roundeven", a), given[0])]
 
 
 def _convert(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
@@ -101,20 +101,20 @@ def _convert(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Val
 
 
 def _select(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
-    def choose(which: Value, *cases: Value) -> Value:
-        if which.kind == "b":
-            return code.select(which, cases[-1], cases[0])
+    def choose(choice: Value, *cases: Value) -> Value:
+        if choice.kind == "b":
+            return code.select(choice, cases[-1], cases[0])
         result = cases[-1]
         for k in reversed(range(len(cases) - 1)):
-            result = code.select(code.compare("le", which, code.constant(k, which.kind)), cases[k], result)
+            result = code.select(code.compare("le", choice, code.constant(k, choice.kind)), cases[k], result)
         return result
 
     return [each(choose, *given)]
 
 
 def _clamp(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
-    def clamp(least: Value, value: Value, most: Value) -> Value:
-        return code.arithmetic("min", code.arithmetic("max", least, value), most)
+    def clamp(low: Value, value: Value, high: Value) -> Value:
+        return code.arithmetic("min", code.arithmetic("max", low, value), high)
 
     return [each(clamp, *given)]
 

@@ -42,8 +42,8 @@ class Windows(NamedTuple):
         batch = indices.shape[:-1]
         starts = np.zeros((*batch, len(shape)), int)
         starts[..., list(self.named)] = indices
-        for axis, which in self.batching.items():
-            starts[..., axis] = np.arange(shape[axis]).reshape([-1 if k == which else 1 for k in range(len(batch))])
+        for axis, index in self.batching.items():
+            starts[..., axis] = np.arange(shape[axis]).reshape([-1 if k == index else 1 for k in range(len(batch))])
         inside = starts.clip(0, np.subtract(shape, self.sizes))
         strides = np.array([int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))], int)
         offsets = np.tensordot(strides, np.indices(self.sizes), 1)
@@ -60,14 +60,14 @@ def windows_of(equation: Any) -> Windows:
     (array, *_, updates), result = [x.aval.shape for x in equation.invars], equation.outvars[0].aval.shape
     if equation.primitive.name == "gather":
         axes = numbers.offset_dims, numbers.collapsed_slice_dims, numbers.start_index_map
-        whole, counted = result, numbers.start_indices_batching_dims
+        shape, index_axes = result, numbers.start_indices_batching_dims
     else:
         axes = numbers.update_window_dims, numbers.inserted_window_dims, numbers.scatter_dims_to_operand_dims
-        whole, counted = updates, numbers.scatter_indices_batching_dims
-    offsets, left_out, named = (tuple(map(int, some)) for some in axes)
-    batching = {int(axis): int(k) for axis, k in zip(numbers.operand_batching_dims, counted, strict=True)}
+        shape, index_axes = updates, numbers.scatter_indices_batching_dims
+    offsets, left_out, named = (tuple(map(int, dims)) for dims in axes)
+    batching = {int(axis): int(k) for axis, k in zip(numbers.operand_batching_dims, index_axes, strict=True)}
     remaining = tuple(axis for axis in range(len(array)) if axis not in (*left_out, *batching))
-    of_window = dict(zip(remaining, (whole[k] for k in offsets), strict=True))
+    of_window = dict(zip(remaining, (shape[k] for k in offsets), strict=True))
     sizes = tuple(of_window.get(axis, 1) for axis in range(len(array)))
-    batch = tuple(k for k in range(len(whole)) if k not in offsets)
+    batch = tuple(k for k in range(len(shape)) if k not in offsets)
     return Windows(named, batching, sizes, remaining, offsets, batch, p["mode"] == GatherScatterMode.FILL_OR_DROP)

@@ -63,21 +63,21 @@ class Code(Scalars):
     def room(self, size: int, kind: str, *, lanes: bool) -> Region:
         """Return memory for numbers of one kind."""
         name, count = self.fresh("m"), max(1, size)
-        taken = count * (self.width if lanes else 1) * DTYPES[kind].itemsize
-        if taken > MOST_ON_STACK:
+        byte_count = count * (self.width if lanes else 1) * DTYPES[kind].itemsize
+        if byte_count > MOST_ON_STACK:
             self.entry.append(f"{name} = getelementptr i8, ptr %heap, i64 {self.heap}")
-            self.heap += -(-taken // 64) * 64
+            self.heap += -(-byte_count // 64) * 64
         else:
-            of = f"<{self.width} x {IN_MEMORY[kind]}>" if lanes else IN_MEMORY[kind]
-            self.entry.append(f"{name} = alloca {of}, i64 {count}, align 64")
-            self.memory += taken
+            type_ = f"<{self.width} x {IN_MEMORY[kind]}>" if lanes else IN_MEMORY[kind]
+            self.entry.append(f"{name} = alloca {type_}, i64 {count}, align 64")
+            self.memory += byte_count
         return Region(name, kind, lanes)
 
     def taken_room(self, size: int, kind: str, *, lanes: bool) -> Region:
         """Return memory that can be released; reuse released memory if there is any."""
         key = max(1, size), kind, lanes
-        free = self._free.get(key)
-        region = free.pop() if free else self.room(size, kind, lanes=lanes)
+        released = self._free.get(key)
+        region = released.pop() if released else self.room(size, kind, lanes=lanes)
         self._taken[region] = key
         self.changeable.add(region)
         self.taken.append(region)
@@ -115,44 +115,44 @@ class Code(Scalars):
         table = np.array(numbers, DTYPES[kind])
         key = kind, table.tobytes()
         if (region := self._tables.get(key)) is None:
-            one, name = IN_MEMORY[kind], f"@c{len(self._tables)}"
+            element, name = IN_MEMORY[kind], f"@c{len(self._tables)}"
             texts = (literal(self.constant(number)) for number in table)
-            listed = ", ".join(f"{one} {str(int(text == 'true')) if kind == 'b' else text}" for text in texts)
-            self.constants.append(f"{name} = private constant [{table.size} x {one}] [{listed}], align 64")
+            entries = ", ".join(f"{element} {str(int(text == 'true')) if kind == 'b' else text}" for text in texts)
+            self.constants.append(f"{name} = private constant [{table.size} x {element}] [{entries}], align 64")
             region = self._tables[key] = Region(name, kind, False)
         return region
 
     def load_along(self, region: Region, index: int | Value) -> Value:
         """Return a vector of consecutive numbers in memory from an index on."""
-        of, position = f"<{self.width} x {IN_MEMORY[region.kind]}>", self._address(region, index)
+        type_, position = f"<{self.width} x {IN_MEMORY[region.kind]}>", self._address(region, index)
         hint = ", !invariant.load !0" if region.given else ""
-        text = f"load {of}, ptr {position}, align {DTYPES[region.kind].itemsize}{hint}"
-        return self._read(text, of, region.kind, lanes=True)
+        text = f"load {type_}, ptr {position}, align {DTYPES[region.kind].itemsize}{hint}"
+        return self._read(text, type_, region.kind, lanes=True)
 
     def store_along(self, region: Region, index: int | Value, value: Value) -> None:
         """Emit the store of a vector of consecutive numbers from an index of memory on."""
-        of, position = f"<{self.width} x {IN_MEMORY[region.kind]}>", self._address(region, index)
-        operand = self.stored_operand(value, of, lanes=True)
-        self.lines.append(f"store {of} {operand}, ptr {position}, align {DTYPES[region.kind].itemsize}")
+        type_, position = f"<{self.width} x {IN_MEMORY[region.kind]}>", self._address(region, index)
+        operand = self.stored_operand(value, type_, lanes=True)
+        self.lines.append(f"store {type_} {operand}, ptr {position}, align {DTYPES[region.kind].itemsize}")
 
-    def _read(self, text: str, of: str, kind: str, *, lanes: bool, home: tuple[Region, int] | None = None) -> Value:
+    def _read(self, text: str, type_: str, kind: str, *, lanes: bool, home: tuple[Region, int] | None = None) -> Value:
         """Return the value that an instruction loads from memory with a given type."""
         name = self.fresh()
         self.lines.append(f"{name} = {text}")
-        return Value(self.truths(name, of, lanes=lanes) if kind == "b" else name, kind, lanes, home=home)
+        return Value(self.truths(name, type_, lanes=lanes) if kind == "b" else name, kind, lanes, home=home)
 
-    def truths(self, numbers: str, of: str, *, lanes: bool) -> str:
+    def truths(self, numbers: str, type_: str, *, lanes: bool) -> str:
         """Return truth values from their representation in memory."""
         name = self.fresh()
-        self.lines.append(f"{name} = trunc {of} {numbers} to {self.type_of('b', lanes=lanes)}")
+        self.lines.append(f"{name} = trunc {type_} {numbers} to {self.type_of('b', lanes=lanes)}")
         return name
 
-    def stored_operand(self, value: Value, of: str, *, lanes: bool) -> str:
+    def stored_operand(self, value: Value, type_: str, *, lanes: bool) -> str:
         """Return a value as the operand of a store, in the type of memory."""
         operand = self.operand(value, lanes=lanes)
         if value.kind != "b":
             return operand
-        return self._emitted(f"zext {self.type_of('b', lanes=lanes)} {operand} to {of}", "b", lanes=True).name
+        return self._emitted(f"zext {self.type_of('b', lanes=lanes)} {operand} to {type_}", "b", lanes=True).name
 
     def _address(self, region: Region, index: int | Value) -> str:
         position = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
@@ -163,41 +163,41 @@ class Code(Scalars):
         """Return the number at an index of memory."""
         if isinstance(index, Value) and index.lanes:
             return self._gathered(region, index)
-        of, position = self._element(region, index)
+        type_, position = self._element(region, index)
         hint, home = ", !invariant.load !0" if region.given else "", (region, index) if isinstance(index, int) else None
-        return self._read(f"load {of}, {position}{hint}", of, region.kind, lanes=region.lanes, home=home)
+        return self._read(f"load {type_}, {position}{hint}", type_, region.kind, lanes=region.lanes, home=home)
 
     def store(self, region: Region, index: int | Value, value: Value) -> None:
         """Emit the store of a number at an index of memory."""
         if isinstance(index, Value) and index.lanes:
             self._scatter(region, index, value)
             return
-        of, position = self._element(region, index)
-        self.lines.append(f"store {of} {self.stored_operand(value, of, lanes=region.lanes)}, {position}")
+        type_, position = self._element(region, index)
+        self.lines.append(f"store {type_} {self.stored_operand(value, type_, lanes=region.lanes)}, {position}")
 
     def _gathered(self, region: Region, index: Value) -> Value:
         """Return numbers at indices of memory that differ from lane to lane."""
-        indices, of, kinds = self._addresses(region, index)
-        every = self.operand(self.constant(True), lanes=True)
+        indices, type_, kinds = self._addresses(region, index)
+        mask = self.operand(self.constant(True), lanes=True)
         function = f"@llvm.masked.gather.{kinds}.v{self.width}p0"
-        self.intrinsics.add(f"declare {of} {function}(<{self.width} x ptr>, i32, <{self.width} x i1>, {of})")
+        self.intrinsics.add(f"declare {type_} {function}(<{self.width} x ptr>, i32, <{self.width} x i1>, {type_})")
         align = DTYPES[region.kind].itemsize
-        given = f"<{self.width} x ptr> {indices}, i32 {align}, <{self.width} x i1> {every}, {of} poison"
-        return self._read(f"call {of} {function}({given})", of, region.kind, lanes=True)
+        inputs = f"<{self.width} x ptr> {indices}, i32 {align}, <{self.width} x i1> {mask}, {type_} poison"
+        return self._read(f"call {type_} {function}({inputs})", type_, region.kind, lanes=True)
 
     def _scatter(self, region: Region, index: Value, value: Value) -> None:
         """Emit the store of numbers at indices that differ from lane to lane; each lane has its own memory."""
-        indices, of, kinds = self._addresses(region, index)
-        operand, every = self.stored_operand(value, of, lanes=True), self.operand(self.constant(True), lanes=True)
+        indices, type_, kinds = self._addresses(region, index)
+        operand, mask = self.stored_operand(value, type_, lanes=True), self.operand(self.constant(True), lanes=True)
         function = f"@llvm.masked.scatter.{kinds}.v{self.width}p0"
-        self.intrinsics.add(f"declare void {function}({of}, <{self.width} x ptr>, i32, <{self.width} x i1>)")
+        self.intrinsics.add(f"declare void {function}({type_}, <{self.width} x ptr>, i32, <{self.width} x i1>)")
         align = DTYPES[region.kind].itemsize
-        given = f"{of} {operand}, <{self.width} x ptr> {indices}, i32 {align}, <{self.width} x i1> {every}"
-        self.lines.append(f"call void {function}({given})")
+        inputs = f"{type_} {operand}, <{self.width} x ptr> {indices}, i32 {align}, <{self.width} x i1> {mask}"
+        self.lines.append(f"call void {function}({inputs})")
 
     def _addresses(self, region: Region, index: Value) -> tuple[str, str, str]:
         """Return the addresses of numbers at indices that differ from lane to lane, their type, and its short name."""
-        one = IN_MEMORY[region.kind]
+        element = IN_MEMORY[region.kind]
         if region.lanes:
             read_first = Value("%total", "l", False) if region.given else self.constant(self.width, "l")
             counts = ", ".join(f"i64 {k}" for k in range(self.width))
@@ -206,21 +206,21 @@ class Code(Scalars):
             if region.given:
                 index = self.arithmetic("add", index, Value("%lane", "l", False))
         vector = self.operand(index, lanes=True)
-        address = f"getelementptr {one}, ptr {region.pointer}, <{self.width} x i64> {vector}"
-        short = f"v{self.width}{'f64' if region.kind == 'f' else one}"
-        return self._emitted(address, "l", lanes=True).name, f"<{self.width} x {one}>", short
+        address = f"getelementptr {element}, ptr {region.pointer}, <{self.width} x i64> {vector}"
+        suffix = f"v{self.width}{'f64' if region.kind == 'f' else element}"
+        return self._emitted(address, "l", lanes=True).name, f"<{self.width} x {element}>", suffix
 
     def _element(self, region: Region, index: int | Value) -> tuple[str, str]:
         """Return the type of a number in memory, and its address with the alignment."""
-        one = IN_MEMORY[region.kind]
-        of = f"<{self.width} x {one}>" if region.lanes else one
+        element = IN_MEMORY[region.kind]
+        type_ = f"<{self.width} x {element}>" if region.lanes else element
         position = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
         if region.given and region.lanes:
-            first = self._emitted(f"mul i64 {position}, %total", "l", lanes=False).name
-            position = self._emitted(f"add i64 {first}, %lane", "l", lanes=False).name
-        address = f"getelementptr {one if region.given else of}, ptr {region.pointer}, i64 {position}"
+            start = self._emitted(f"mul i64 {position}, %total", "l", lanes=False).name
+            position = self._emitted(f"add i64 {start}, %lane", "l", lanes=False).name
+        address = f"getelementptr {element if region.given else type_}, ptr {region.pointer}, i64 {position}"
         name = self._emitted(address, "l", lanes=False).name
-        return of, f"ptr {name}, align {DTYPES[region.kind].itemsize}"
+        return type_, f"ptr {name}, align {DTYPES[region.kind].itemsize}"
 
     # -- attempts -----------------------------------------------------------------------------------------------------
 
@@ -241,11 +241,11 @@ class Code(Scalars):
 
     def back_to(self, mark: tuple[Any, ...]) -> None:
         """Undo what was emitted since a mark in the same scope."""
-        lines, entry, known, self.memory, self.heap, free_regions, taken, count, subroutines = mark
+        lines, entry, scope_length, self.memory, self.heap, free_regions, taken, count, subroutines = mark
         self._free, self._taken = {key: list(regions) for key, regions in free_regions.items()}, dict(taken)
         del self.lines[lines:], self.entry[entry:], self.taken[count:]
-        self._forget(self._scopes[-1][known:])
-        del self._scopes[-1][known:]
+        self._forget(self._scopes[-1][scope_length:])
+        del self._scopes[-1][scope_length:]
         while len(self.subroutines) > subroutines:
             self.subroutines.popitem()
 

@@ -13,10 +13,10 @@ def among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
     return regions_of(arrays).__contains__
 
 
-def forget_variables(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
+def forget_variables(code: Code, arrays: dict[Any, Array], variables: Sequence[Any]) -> None:
     """Forget variables that are not read any more, and release memory that only they used."""
-    gone = [known.pop(variable, None) for variable in variables]
-    release_arrays(code, [array for array in gone if isinstance(array, InMemory)])
+    forgotten = [arrays.pop(variable, None) for variable in variables]
+    release_arrays(code, [array for array in forgotten if isinstance(array, InMemory)])
 
 
 def release_arrays(code: Code, arrays: Sequence[Array]) -> None:
@@ -26,10 +26,10 @@ def release_arrays(code: Code, arrays: Sequence[Array]) -> None:
             code.release(region)
 
 
-def release_all_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) -> None:
+def release_all_but(code: Code, regions: Sequence[Region], arrays: Sequence[Array]) -> None:
     """Release allocated memory except that of arrays."""
-    live = regions_of(arrays) if taken else {}
-    for region in dict.fromkeys(taken):
+    live = regions_of(arrays) if regions else {}
+    for region in dict.fromkeys(regions):
         if region not in live:
             code.release(region)
 
@@ -41,4 +41,4 @@ def regions_of(arrays: Sequence[Array]) -> dict[Region, None]:
     text, and another name in the store.
     """
     parts = [array.given if isinstance(array, Deferred) else [array] for array in arrays]
-    return dict.fromkeys(part.region for some in parts for part in some if isinstance(part, Stored))
+    return dict.fromkeys(part.region for operands in parts for part in operands if isinstance(part, Stored))

@@ -92,8 +92,8 @@ class Scalars:
     _vectors: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def __post_init__(self):
-        self._types = {(kind, False): of for kind, of in SCALARS.items()}
-        self._types |= {(kind, True): f"<{self.width} x {of}>" for kind, of in SCALARS.items()}
+        self._types = {(kind, False): type_name for kind, type_name in SCALARS.items()}
+        self._types |= {(kind, True): f"<{self.width} x {type_name}>" for kind, type_name in SCALARS.items()}
 
     # -- text ---------------------------------------------------------------------------------------------------------
 
@@ -113,8 +113,8 @@ class Scalars:
             return self._repeated(value.kind, text) if lanes else text
         if not lanes or value.lanes:
             return value.name
-        vector, one = self.type_of(value.kind, lanes=True), SCALARS[value.kind]
-        first = self._emitted(f"insertelement {vector} poison, {one} {value.name}, i64 0", value.kind, lanes=True).name
+        vector, item = self.type_of(value.kind, lanes=True), SCALARS[value.kind]
+        first = self._emitted(f"insertelement {vector} poison, {item} {value.name}, i64 0", value.kind, lanes=True).name
         indices = f"<{self.width} x i32> zeroinitializer"
         return self._emitted(f"shufflevector {vector} {first}, {vector} poison, {indices}", value.kind, lanes=True).name
 
@@ -125,8 +125,8 @@ class Scalars:
 
     def _emitted(self, instruction: str, kind: str, *, lanes: bool) -> Value:
         """Return the result of an instruction without side effects, emitted only if it is new."""
-        if (known := self._known.get(instruction)) is not None:
-            return known
+        if (earlier := self._known.get(instruction)) is not None:
+            return earlier
         if len(self.lines) > self.most:
             raise UnsupportedOperationError(f"a program of more than {self.most:,} lines")
         self._count += 1
@@ -144,10 +144,10 @@ class Scalars:
     def _called(self, name: str, result: str, kinds: str, given: Sequence[str], *, lanes: bool) -> Value:
         """Return the result of an LLVM intrinsic, whose name ends in the types of `kinds`."""
         sizes = "".join(f".{f'v{self.width}' if lanes else ''}{'f64' if k == 'f' else SCALARS[k]}" for k in kinds)
-        of, written = self.type_of(kinds[-1], lanes=lanes), self.type_of(result, lanes=lanes)
-        self.intrinsics.add(f"declare {written} @llvm.{name}{sizes}({', '.join([of] * len(given))})")
-        listed = ", ".join(f"{of} {operand}" for operand in given)
-        return self._emitted(f"call {written} @llvm.{name}{sizes}({listed})", result, lanes=lanes)
+        argument_type, result_type = self.type_of(kinds[-1], lanes=lanes), self.type_of(result, lanes=lanes)
+        self.intrinsics.add(f"declare {result_type} @llvm.{name}{sizes}({', '.join([argument_type] * len(given))})")
+        arguments = ", ".join(f"{argument_type} {operand}" for operand in given)
+        return self._emitted(f"call {result_type} @llvm.{name}{sizes}({arguments})", result, lanes=lanes)
 
     @contextmanager
     def scope(self, active: Value | None = None) -> Iterator[None]:
@@ -158,14 +158,14 @@ class Scalars:
         active : Value or None
             Mask of the active lanes in the scope, if it differs from that around it.
         """
-        around = self.active
-        self.active = around if active is None else active
+        outer_mask = self.active
+        self.active = outer_mask if active is None else active
         self._scopes.append([])
         try:
             yield
         finally:
             self._forget(self._scopes.pop())
-            self.active = around
+            self.active = outer_mask
 
     def among_active(self, choice: Value) -> Value:
         """Return a truth value restricted to the active lanes, if it differs from lane to lane."""
@@ -173,8 +173,8 @@ class Scalars:
 
     def constant(self, number: Any, kind: str | None = None) -> Value:
         """Return a constant, by default of the kind of its type."""
-        if (plain := PLAIN.get((type(number), kind))) is not None:
-            return Value("", plain[0], False, plain[1](number))
+        if (conversion := PLAIN.get((type(number), kind))) is not None:
+            return Value("", conversion[0], False, conversion[1](number))
         scalar = (np.asarray(number) if kind is None else np.asarray(number).astype(DTYPES[kind]))[()]
         return Value("", kind or kind_of(scalar.dtype), False, scalar)
 
@@ -191,8 +191,8 @@ class Scalars:
         if a.constant is not None and b.constant is not None:
             return self.constant(python(a.constant, b.constant), a.kind)
         if a.constant is not None or b.constant is not None:
-            if (same := _neutral(operation, a, b)) is not None:
-                return same
+            if (operand := _neutral(operation, a, b)) is not None:
+                return operand
             if self.sparse and a.kind == "f" and _is_nothing(operation, a, b):
                 return self.constant(0.0)  # without a sign
         if operation in COMMUTATIVE and a.name > b.name:
@@ -213,15 +213,15 @@ class Scalars:
 
     def _division(self, operation: str, word: str, a: Value, b: Value) -> Value:
         """Return a quotient or remainder of integers as XLA defines it, with divisors that do not trap."""
-        one, least = self.constant(1, a.kind), self.constant(np.iinfo(DTYPES[a.kind]).min, a.kind)
+        one, minimum = self.constant(1, a.kind), self.constant(np.iinfo(DTYPES[a.kind]).min, a.kind)
         if b.constant is None:  # in an inactive lane it may be undefined, with a different value at each use
             frozen = f"freeze {self.type_of(b.kind, lanes=b.lanes)} {b.name}"
             b = self._emitted(frozen, b.kind, lanes=b.lanes)
         opposite = self.compare("eq", b, self.constant(-1, a.kind)) if a.kind != "u" else self.constant(False)
-        beyond = self.logic("and", self.compare("eq", a, least), opposite)
-        nothing = self.compare("eq", b, self.constant(0, a.kind))
-        result = self._pair(word, a, self.select(self.logic("or", nothing, beyond), one, b))
-        return self.select(nothing, self.constant(-1, a.kind) if operation == "div" else a, result)
+        overflow = self.logic("and", self.compare("eq", a, minimum), opposite)
+        is_zero = self.compare("eq", b, self.constant(0, a.kind))
+        result = self._pair(word, a, self.select(self.logic("or", is_zero, overflow), one, b))
+        return self.select(is_zero, self.constant(-1, a.kind) if operation == "div" else a, result)
 
     def compare(self, operation: str, a: Value, b: Value) -> Value:
         """Return whether a comparison of two numbers holds."""
@@ -262,8 +262,8 @@ class Scalars:
         """Return the bits of a double as an integer."""
         if a.constant is not None:
             return self.constant(a.constant.view(np.int64))
-        double, whole = self.type_of("f", lanes=a.lanes), self.type_of("l", lanes=a.lanes)
-        return self._emitted(f"bitcast {double} {a.name} to {whole}", "l", lanes=a.lanes)
+        double, integer = self.type_of("f", lanes=a.lanes), self.type_of("l", lanes=a.lanes)
+        return self._emitted(f"bitcast {double} {a.name} to {integer}", "l", lanes=a.lanes)
 
     def select(self, choice: Value, a: Value, b: Value) -> Value:
         """Return the first of two numbers where a truth value holds, and the second elsewhere."""
@@ -272,13 +272,13 @@ class Scalars:
         if a is b or (a.name and a.name == b.name) or is_same_constant(a, b):
             return a
         lanes = choice.lanes or a.lanes or b.lanes
-        which, on = self.operand(choice, lanes=lanes), self.type_of("b", lanes=lanes)
+        mask, mask_type = self.operand(choice, lanes=lanes), self.type_of("b", lanes=lanes)
         left, right, kind = (
             self.operand(a, lanes=lanes),
             self.operand(b, lanes=lanes),
             self.type_of(a.kind, lanes=lanes),
         )
-        return self._emitted(f"select {on} {which}, {kind} {left}, {kind} {right}", a.kind, lanes=lanes)
+        return self._emitted(f"select {mask_type} {mask}, {kind} {left}, {kind} {right}", a.kind, lanes=lanes)
 
     def intrinsic(self, operation: str, a: Value) -> Value:
         """Return an LLVM intrinsic of one double that has an instruction."""
@@ -289,15 +289,17 @@ class Scalars:
         lanes = any(value.lanes for value in given)
         if lanes and function in TURNS:
             self.functions |= {(name, 1) for name in TURNS}
-            of = self.type_of("f", lanes=True)
-            both = self._emitted(f"call {{ {of}, {of} }} @sine_and_cosine({of} {given[0].name})", "f", lanes=True)
-            which = TURNS.index(function)
-            return self._emitted(f"extractvalue {{ {of}, {of} }} {both.name}, {which}", "f", lanes=True)
+            vector = self.type_of("f", lanes=True)
+            pair = self._emitted(
+                f"call {{ {vector}, {vector} }} @sine_and_cosine({vector} {given[0].name})", "f", lanes=True
+            )
+            index = TURNS.index(function)
+            return self._emitted(f"extractvalue {{ {vector}, {vector} }} {pair.name}, {index}", "f", lanes=True)
         operands, kind = [self.operand(value, lanes=lanes) for value in given], self.type_of("f", lanes=lanes)
         self.functions.add((function, len(given)))
-        called = f"@{function}_of_lanes" if lanes else f"@{function}"
-        listed = ", ".join(f"{kind} {operand}" for operand in operands)
-        return self._emitted(f"call {kind} {called}({listed})", "f", lanes=lanes)
+        callee = f"@{function}_of_lanes" if lanes else f"@{function}"
+        arguments = ", ".join(f"{kind} {operand}" for operand in operands)
+        return self._emitted(f"call {kind} {callee}({arguments})", "f", lanes=lanes)
 
     def converted(self, a: Value, to: str) -> Value:
         """Return a number converted to another kind; a double out of range becomes the nearest integer."""
@@ -319,9 +321,9 @@ class Scalars:
         """Return the name of the truth value whether a value holds in any lane."""
         if not a.lanes:
             return self.operand(a, lanes=False)
-        of, called = self.type_of("b", lanes=True), f"@llvm.vector.reduce.or.v{self.width}i1"
-        self.intrinsics.add(f"declare i1 {called}({of})")
-        return self._emitted(f"call i1 {called}({of} {a.name})", "b", lanes=False).name
+        vector, callee = self.type_of("b", lanes=True), f"@llvm.vector.reduce.or.v{self.width}i1"
+        self.intrinsics.add(f"declare i1 {callee}({vector})")
+        return self._emitted(f"call i1 {callee}({vector} {a.name})", "b", lanes=False).name
 
     # -- order --------------------------------------------------------------------------------------------------------
 
@@ -362,8 +364,8 @@ def _neutral(operation: str, a: Value, b: Value) -> Value | None:
 
     The sign of -0 + 0 is ignored, as by XLA.
     """
-    if (nothing := NEUTRAL.get(operation)) is None:
+    if (neutral := NEUTRAL.get(operation)) is None:
         return None
-    if b.constant is not None and b.constant == nothing:
+    if b.constant is not None and b.constant == neutral:
         return a
-    return b if operation in COMMUTATIVE and a.constant is not None and a.constant == nothing else None
+    return b if operation in COMMUTATIVE and a.constant is not None and a.constant == neutral else None

@@ -14,7 +14,7 @@ SINE = tuple((-1.0) ** (k // 2) / math.factorial(k) for k in range(17, 2, -2))
 COSINE = tuple((-1.0) ** (k // 2) / math.factorial(k) for k in range(18, 3, -2))
 
 
-def sine_and_cosine(around: Scalars) -> str:
+def sine_and_cosine(program: Scalars) -> str:
     """Return the text of a function of a vector of angles, rad, with errors of at most one unit in the last place.
 
     Angles are reduced by whole quarter turns (Cody and Waite 1980, Software Manual for the Elementary Functions,
@@ -23,10 +23,10 @@ def sine_and_cosine(around: Scalars) -> str:
 
     Parameters
     ----------
-    around : Scalars
+    program : Scalars
         The program of the function.
     """
-    code = Scalars(around.width)
+    code = Scalars(program.width)
     x, vector, truths = Value("%x", "f", True), code.type_of("f", lanes=True), code.type_of("b", lanes=True)
 
     def number(value: float) -> Value:
@@ -55,18 +55,18 @@ def sine_and_cosine(around: Scalars) -> str:
     turns = minus(shifted, number(SHIFT))
     first = minus(x, times(turns, number(QUARTER[0])))
     second = times(turns, number(QUARTER[1]))
-    left = minus(first, second)
-    third = minus(times(turns, number(QUARTER[2])), minus(minus(first, left), second))
-    angle = minus(left, third)
-    rest = minus(minus(left, angle), third)  # part of the angle below its last bit
+    remainder = minus(first, second)
+    third = minus(times(turns, number(QUARTER[2])), minus(minus(first, remainder), second))
+    angle = minus(remainder, third)
+    tail = minus(minus(remainder, angle), third)  # part of the angle below its last bit
     square = times(angle, angle)
     half = times(square, number(0.5))
-    nearly = minus(number(1.0), half)
+    leading = minus(number(1.0), half)
     small = code.compare("lt", code.intrinsic("fabs", angle), number(SMALLEST))
-    sine = plus(angle, plus(times(times(square, angle), series(SINE, square)), times(rest, nearly)))
+    sine = plus(angle, plus(times(times(square, angle), series(SINE, square)), times(tail, leading)))
     sine = code.select(small, angle, sine)
-    cosine = minus(times(times(square, square), series(COSINE, square)), times(angle, rest))
-    cosine = plus(nearly, plus(minus(minus(number(1.0), nearly), half), cosine))
+    cosine = minus(times(times(square, square), series(COSINE, square)), times(angle, tail))
+    cosine = plus(leading, plus(minus(minus(number(1.0), leading), half), cosine))
 
     one, count = code.constant(1, "l"), Value("%count", "l", True)
     code.lines.append(f"{count.name} = bitcast {vector} {shifted.name} to {code.type_of('l', lanes=True)}")
@@ -74,26 +74,26 @@ def sine_and_cosine(around: Scalars) -> str:
     sine, cosine = code.select(swapped, cosine, sine), code.select(swapped, sine, cosine)
     sine = code.select(is_negative(count), code.negated(sine), sine)
     cosine = code.select(is_negative(code.arithmetic("add", count, one)), code.negated(cosine), cosine)
-    known = code.compare("le", code.intrinsic("fabs", x), number(LARGEST))
+    in_range = code.compare("le", code.intrinsic("fabs", x), number(LARGEST))
     canceled = code.logic("and", small, code.compare("ne", turns, number(0.0)))
-    others = code.logic("or", code.inverted(known), canceled)
-    code.branch(code.anywhere(others), "others", "end")
+    uncertain = code.logic("or", code.inverted(in_range), canceled)
+    code.branch(code.anywhere(uncertain), "others", "end")
     code.begin("others")
-    for letter, own, function in (("s", sine, "sin"), ("c", cosine, "cos")):
+    for letter, computed, function in (("s", sine, "sin"), ("c", cosine, "cos")):
         code.lines += [
             f"%{letter}1 = call {vector} @{function}_of_lanes({vector} %x)",
-            f"%{letter}2 = select {truths} {others.name}, {vector} %{letter}1, {vector} {own.name}",
+            f"%{letter}2 = select {truths} {uncertain.name}, {vector} %{letter}1, {vector} {computed.name}",
         ]
     code.jump("end")
     code.begin("end")
-    for letter, own in (("s", sine), ("c", cosine)):
-        code.lines.append(f"%{letter} = phi {vector} [{own.name}, %begin], [%{letter}2, %others]")
+    for letter, computed in (("s", sine), ("c", cosine)):
+        code.lines.append(f"%{letter} = phi {vector} [{computed.name}, %begin], [%{letter}2, %others]")
     pair = f"{{ {vector}, {vector} }}"
     code.lines += [
         f"%one = insertvalue {pair} poison, {vector} %s, 0",
         f"%both = insertvalue {pair} %one, {vector} %c, 1",
         f"ret {pair} %both",
     ]
-    around.intrinsics |= code.intrinsics
+    program.intrinsics |= code.intrinsics
     body = "\n".join(code.lines)
     return f"define internal {pair} @sine_and_cosine({vector} %x) noinline #2 {{\nbegin:\n{body}\n}}"

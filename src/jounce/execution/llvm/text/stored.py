@@ -116,8 +116,8 @@ def stored(code: Code, array: Array) -> Stored:
     if all(value.constant is not None for value in values):
         table = np.array([value.constant for value in values])
         if len(values) > 1 and len({number.tobytes() for number in table}) == 1:
-            one = contiguous(code.constants_region([table[0]], values[0].kind), ())
-            return spread(one, array.shape, ())
+            element = contiguous(code.constants_region([table[0]], values[0].kind), ())
+            return spread(element, array.shape, ())
         region, first = code.constants_region([v.constant for v in values], values[0].kind), 0
     else:
         region, first = in_memory(code, values)
@@ -170,20 +170,20 @@ def counted(code: Code, count: int, body: Callable[[int | Value], None]) -> None
             body(0)
         return
     before, head, latch, end = (code.label() for _ in range(4))
-    index, following = code.fresh("i"), code.fresh("i")
+    index, next_index = code.fresh("i"), code.fresh("i")
     code.jump(before)
     code.begin(before)
     code.jump(head)
     code.begin(head)
-    code.lines.append(f"{index} = phi i64 [0, %{before}], [{following}, %{latch}]")
+    code.lines.append(f"{index} = phi i64 [0, %{before}], [{next_index}, %{latch}]")
     with code.scope():
         body(Value(index, "l", False))
     code.jump(latch)
     code.begin(latch)
-    over = code.fresh()
-    code.lines.append(f"{following} = add nuw nsw i64 {index}, 1")
-    code.lines.append(f"{over} = icmp eq i64 {following}, {count}")
-    code.branch(over, end, head)
+    is_last = code.fresh()
+    code.lines.append(f"{next_index} = add nuw nsw i64 {index}, 1")
+    code.lines.append(f"{is_last} = icmp eq i64 {next_index}, {count}")
+    code.branch(is_last, end, head)
     code.begin(end)
 
 
@@ -209,18 +209,18 @@ def nest(code: Code, given: Sequence[Stored], result: Sequence[Stored], body: Bo
         if not axes:
             _visit(code, given, result, body, indices)
             return
-        axis, *rest = axes
+        axis, *inner_axes = axes
         size, steps = shape[axis], [s[axis] for s in strides]
 
         def moved(k: int | Value) -> list[int | Value]:
             return [further(code, index, k, step) for index, step in zip(indices, steps, strict=True)]
 
-        if rest or not code.single or size < code.width or not _is_along(steps, len(given)):
-            counted(code, size, lambda k: run(rest, moved(k)))
+        if inner_axes or not code.single or size < code.width or not _is_along(steps, len(given)):
+            counted(code, size, lambda k: run(inner_axes, moved(k)))
             return
-        along = [step == 1 for step in steps]
+        unit_strides = [step == 1 for step in steps]
         single = (lambda k: _visit(code, given, result, body, moved(k))) if adds else None
-        _in_vectors(code, size, lambda k: _visit(code, given, result, body, moved(k), along), single)
+        _in_vectors(code, size, lambda k: _visit(code, given, result, body, moved(k), unit_strides), single)
 
     run(_order(shape, strides, len(given)), [array.first for array in arrays])
 
@@ -231,16 +231,16 @@ def _visit(
     result: Sequence[Stored],
     body: Body,
     indices: Sequence[int | Value],
-    along: Sequence[bool] | None = None,
+    unit_strides: Sequence[bool] | None = None,
 ) -> None:
     """Emit the body at one index of each array, or for a vector of numbers from the index on in some arrays."""
-    along = [False] * len(indices) if along is None else along
+    unit_strides = [False] * len(indices) if unit_strides is None else unit_strides
     read = [
         code.load_along(array.region, index) if vector else without_home(code.load(array.region, index))
-        for array, index, vector in zip(given, indices, along, strict=False)
+        for array, index, vector in zip(given, indices, unit_strides, strict=False)
     ]
-    first = len(given)
-    for array, index, vector, value in zip(result, indices[first:], along[first:], body(read), strict=True):
+    count = len(given)
+    for array, index, vector, value in zip(result, indices[count:], unit_strides[count:], body(read), strict=True):
         (code.store_along if vector else code.store)(array.region, index, value)
 
 
@@ -257,21 +257,21 @@ def _in_vectors(code: Code, size: int, vector: Visit, single: Visit | None) -> N
     single : callable or None
         Emits the code for each remaining number; None if the last vector may overlap the one before.
     """
-    whole, left = divmod(size, code.width)
-    if left and single is None:
+    count, remainder = divmod(size, code.width)
+    if remainder and single is None:
 
         def last(k: int | Value) -> None:
-            start, most = further(code, 0, k, code.width), size - code.width
+            start, last_start = further(code, 0, k, code.width), size - code.width
             if isinstance(start, Value):
-                vector(code.arithmetic("min", start, code.constant(most, "l")))
+                vector(code.arithmetic("min", start, code.constant(last_start, "l")))
             else:
-                vector(min(start, most))
+                vector(min(start, last_start))
 
-        counted(code, whole + 1, last)
+        counted(code, count + 1, last)
         return
-    counted(code, whole, lambda k: vector(further(code, 0, k, code.width)))
+    counted(code, count, lambda k: vector(further(code, 0, k, code.width)))
     if single is not None:
-        counted(code, left, lambda k: single(further(code, whole * code.width, k, 1)))
+        counted(code, remainder, lambda k: single(further(code, count * code.width, k, 1)))
 
 
 def _is_along(steps: Sequence[int], given: int) -> bool:

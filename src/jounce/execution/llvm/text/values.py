@@ -61,8 +61,8 @@ def literal(value: Value) -> str:
 def nearest(number: Any, dtype: Any) -> int:
     """Return a double truncated to an integer and clamped to the range of a type, as by XLA."""
     limits = np.iinfo(dtype)
-    whole = 0 if np.isnan(number) else int(min(max(number, -(2.0**63)), 2.0**63))
-    return min(max(whole, limits.min), limits.max)
+    integer = 0 if np.isnan(number) else int(min(max(number, -(2.0**63)), 2.0**63))
+    return min(max(integer, limits.min), limits.max)
 
 
 def quotient(a: Any, b: Any) -> Any:

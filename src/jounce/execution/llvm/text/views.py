@@ -112,8 +112,8 @@ class Deferred(Shaped):
     def in_shape(self, shape: Sequence[int]) -> "Deferred | None":
         """Return the same numbers in another shape; None if an operand has no strides for it."""
         result = [in_shape(array, shape) for array in self.given]
-        whole = tuple(array for array in result if array is not None)
-        return replace(self, given=whole) if len(whole) == len(result) else None
+        operands = tuple(array for array in result if array is not None)
+        return replace(self, given=operands) if len(operands) == len(result) else None
 
 
 def as_read(array: Stored) -> Deferred:
@@ -135,8 +135,8 @@ def further(code: Code, first: int | Value, steps: int | Value, stride: int) -> 
     """Return an index advanced by a number of strides."""
     if not isinstance(steps, Value) and not isinstance(first, Value):
         return first + int(steps) * stride
-    more = code.arithmetic("mul", _whole(code, steps), code.constant(stride, "l"))
-    return _plain(code.arithmetic("add", _whole(code, first), more))
+    offset = code.arithmetic("mul", _whole(code, steps), code.constant(stride, "l"))
+    return _plain(code.arithmetic("add", _whole(code, first), offset))
 
 
 def _whole(code: Code, number: int | Value) -> Value:
@@ -149,10 +149,10 @@ def _plain(value: Value) -> int | Value:
 
 def views_of(code: Code, array: Stored, views: Callable[[np.ndarray], Sequence[np.ndarray]]) -> list[Stored]:
     """Return the views that a function of a NumPy array, with one byte for each number, returns."""
-    whole, begin = as_strided(ORIGIN, array.shape, array.strides), address_of(ORIGIN)
+    byte_array, origin = as_strided(ORIGIN, array.shape, array.strides), address_of(ORIGIN)
     return [
-        Stored(array.region, view.shape, view.strides, further(code, array.first, address_of(view) - begin, 1))
-        for view in views(whole)
+        Stored(array.region, view.shape, view.strides, further(code, array.first, address_of(view) - origin, 1))
+        for view in views(byte_array)
     ]
 
 
@@ -190,31 +190,31 @@ def merged(shape: Sequence[int], strides: Sequence[Sequence[int]]) -> tuple[list
     for k, size in enumerate(shape):
         if size == 1:
             continue
-        own = [s[k] for s in strides]
-        if sizes and all(step[-1] == size * stride for step, stride in zip(steps, own, strict=True)):
+        axis_strides = [s[k] for s in strides]
+        if sizes and all(step[-1] == size * stride for step, stride in zip(steps, axis_strides, strict=True)):
             sizes[-1] *= size
-            for step, stride in zip(steps, own, strict=True):
+            for step, stride in zip(steps, axis_strides, strict=True):
                 step[-1] = stride
             continue
         sizes.append(size)
-        for step, stride in zip(steps, own, strict=True):
+        for step, stride in zip(steps, axis_strides, strict=True):
             step.append(stride)
     return sizes, steps
 
 
 def divided(sizes: Sequence[int], strides: Sequence[Sequence[int]], shape: Sequence[int]) -> tuple[int, ...] | None:
     """Return the strides of merged axes split to another shape; None if there are none."""
-    result, waiting, left, stride = [], list(zip(sizes, strides[0], strict=True)), 1, 0
+    result, axes, remaining, stride = [], list(zip(sizes, strides[0], strict=True)), 1, 0
     for size in reversed(shape):
         if size == 1:
             result.append(0)
             continue
-        if left == 1:
-            left, stride = waiting.pop()
-        if left % size:
+        if remaining == 1:
+            remaining, stride = axes.pop()
+        if remaining % size:
             return None
         result.append(stride)
-        left, stride = left // size, stride * size
+        remaining, stride = remaining // size, stride * size
     return tuple(reversed(result))
 
 
