@@ -103,12 +103,12 @@ def relative_angle(
 def _turn(body_i: SpatialPose, body_j: SpatialPose, axis: Vectors, datum: Datum | None) -> Jet:
     quaternion, w = body_j.quaternion, body_j.angular_velocity  # the latter in the frame of body j
     if body_i.angular_velocity is not None:
-        turning = body_j.to_body(body_i.global_angular_velocity())
-        w = -turning if w is None else w - turning
+        omega = body_j.to_body(body_i.global_angular_velocity())
+        w = -omega if w is None else w - omega
     if datum is not None:  # the rotation of body j since the datum, at which it has the frame of body i
-        back = [part * sign for part, sign in zip(components(datum.attitude), (1.0, -1.0, -1.0, -1.0), strict=True)]
-        quaternion = total(part * x for part, x in zip((quaternion, *body_j.spins), back, strict=True))
-        w = None if w is None else stack([dot(side, w) for side in body_axes(jnp.concatenate(back))])
+        inverse = [part * sign for part, sign in zip(components(datum.attitude), (1.0, -1.0, -1.0, -1.0), strict=True)]
+        quaternion = total(part * x for part, x in zip((quaternion, *body_j.spins), inverse, strict=True))
+        w = None if w is None else stack([dot(side, w) for side in body_axes(jnp.concatenate(inverse))])
     e0, e = body_i.relative_quaternion(quaternion)
     along = dot(axis, e)
     value = 2.0 * jnp.arctan2(along.coefficients[0], e0.coefficients[0])
@@ -141,16 +141,16 @@ def coaxial(axis_i: Vectors, axis_j: Vectors) -> Datum:
     """
     u, v = (axis / length_of(axis)[None] for axis in (axis_i, axis_j))
     opposite = dot(u, v) < 0
-    near = jnp.where(opposite[None], -u, u)
+    aligned = jnp.where(opposite[None], -u, u)
     # the shortest rotation that takes the axis of body j to that of body i, or to its opposite
-    attitude = jnp.concatenate([1.0 + dot(v, near)[None], cross(v, near)])
+    attitude = jnp.concatenate([1.0 + dot(v, aligned)[None], cross(v, aligned)])
     attitude = attitude / length_of(attitude)[None]
     side, _ = perpendiculars(u)  # axis of half a turn that follows
     e0, e = attitude[:1], attitude[1:]
     flipped = jnp.concatenate([-dot(side, e)[None], e0 * side + cross(side, e)])
     attitude = jnp.where(opposite[None], flipped, attitude)
-    angle, known = angle_of(attitude, u)
-    angle = jnp.where(known, angle, 0.0)
+    angle, is_defined = angle_of(attitude, u)
+    angle = jnp.where(is_defined, angle, 0.0)
     return Datum(attitude, angle, angle)
 
 

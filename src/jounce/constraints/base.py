@@ -66,21 +66,21 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
             )
             raise MechanismError(message, name="field", value=name)
     catalogues = [_REGISTRY.setdefault((each, role), {}) for each in ((space,) if space else SPACES)]
-    for taken in catalogues:
-        other = _last_whole(taken.get(type, ()))
-        ours = other is not None and _belongs_to_package(other)
-        if other is None or (not ours and _full_name(other) == _full_name(kind)):
+    for entries in catalogues:
+        other = _last_whole(entries.get(type, ()))
+        is_own = other is not None and _belongs_to_package(other)
+        if other is None or (not is_own and _full_name(other) == _full_name(kind)):
             continue
         name = f"{other.__module__}.{other.__qualname__}"
-        if not ours or _belongs_to_package(kind):
+        if not is_own or _belongs_to_package(kind):
             message = f"the {role} type of {kind.__qualname__} is that of {name} already; give it another one"
             raise MechanismError(message, name="type", value=type)
         message = f"type {type!r} names {kind.__qualname__} in files now, no longer {name}; another type keeps both"
         warn_caller(ReplacedTypeWarning(message))
     kind.type_name, kind.space, kind.role = type, space, role
-    for free in catalogues:
-        before = _last_whole(free.get(type, ()))
-        free[type] = (kind,) if before is None else (before, kind)
+    for entries in catalogues:
+        before = _last_whole(entries.get(type, ()))
+        entries[type] = (kind,) if before is None else (before, kind)
 
 
 class AbstractConstraint(Module):
@@ -205,10 +205,10 @@ class AbstractConstraint(Module):
         varied = [k for k, change in enumerate(changes) if change is not None]
 
         def residual(*poses: Any) -> Jet:
-            placed = list(bodies)
+            displaced = list(bodies)
             for k, pose in zip(varied, poses, strict=True):
-                placed[k] = pose
-            return self.residual(*placed, time)
+                displaced[k] = pose
+            return self.residual(*displaced, time)
 
         return jax.jvp(residual, tuple(bodies[k] for k in varied), tuple(changes[k] for k in varied))[1]
 
@@ -255,8 +255,8 @@ def is_bare_ratio(element: AbstractConstraint) -> bool:
     """Return whether a joint couples moving bodies by a ratio only, without the point of contact of its teeth."""
     fields = value_fields(type(element))
     given = "ratio" in fields and getattr(element, "ratio", None) is not None and element.role != "driver"
-    placed = any(getattr(element, name) is not None for name in fields if name.startswith("point"))
-    return given and len({*element.bodies} - {"ground"}) > 1 and not placed
+    has_points = any(getattr(element, name) is not None for name in fields if name.startswith("point"))
+    return given and len({*element.bodies} - {"ground"}) > 1 and not has_points
 
 
 def counted(counts: Sequence[int]) -> str:
@@ -293,11 +293,11 @@ def keep_words_static(kind: type[Any]) -> None:
 
 def check_words(element: Any) -> None:
     """Raise MechanismError unless text fields have permitted words, and the facts of the class are possible."""
-    for name, words in facts_of(type(element)).choices.items():
-        check_choice(name, getattr(element, name), words, MechanismError)
+    for name, choices in facts_of(type(element)).choices.items():
+        check_choice(name, getattr(element, name), choices, MechanismError)
 
 
 def rows(*parts: Jet) -> Jet:
     """Join scalar residuals, of shape (...), and vector ones, of shape (rows, ...), into one of shape (rows, ...)."""
-    whole = [part if len(part.shape) == 3 else part.map(lambda c: c[None]) for part in parts]
-    return concatenate(whole)
+    reshaped = [part if len(part.shape) == 3 else part.map(lambda c: c[None]) for part in parts]
+    return concatenate(reshaped)

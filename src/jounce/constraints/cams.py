@@ -91,16 +91,16 @@ class Cam(AbstractConstraint):
 
     def residual(self, *bodies_and_time: Any) -> Jet:
         *bodies, _ = bodies_and_time
-        leading, held = self.leader.evaluate(*(bodies[k] for k in self.slots[1])), []
+        leading, residuals = self.leader.evaluate(*(bodies[k] for k in self.slots[1])), []
         if self.hidden:
             along, aside, unit = bodies[-1].position
             size = 1.0 if self.unit is None else self.unit
             turn = along / size
-            held = [wrap(leading - turn), aside, unit - size, *upright(bodies[-1])]
+            residuals = [wrap(leading - turn), aside, unit - size, *upright(bodies[-1])]
             leading = turn
         excess = self.evaluate(*bodies) - self.motion(leading)
         excess = wrap(excess) if turns_in_space(self.follower) else excess
-        return rows(excess, *held) if held else excess
+        return rows(excess, *residuals) if residuals else excess
 
 
 def turns_in_space(part: Any) -> bool:

@@ -62,11 +62,11 @@ class Tripod(AbstractConstraint, type="tripod", space="spatial"):
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         first, second = _frame_of(self.axis_i, self.normal_i)
         arm, side = _frame_of(self.axis_j, self.normal_j)
-        held = []
+        residuals = []
         for c, s in ((1.0, 0.0), (-0.5, 0.75**0.5), (-0.5, -(0.75**0.5))):
             roller = body_j.point(self.point_j + self.radius[None] * (c * arm + s * side))
-            held.append(body_i.direction(c * second - s * first).dot(roller - body_i.point(self.point_i)))
-        return rows(*held)
+            residuals.append(body_i.direction(c * second - s * first).dot(roller - body_i.point(self.point_i)))
+        return rows(*residuals)
 
 
 class Oldham(AbstractConstraint, type="oldham", space="spatial"):
@@ -91,8 +91,8 @@ class Oldham(AbstractConstraint, type="oldham", space="spatial"):
         offset = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
         first, _ = _frame_of(self.axis_i, self.vector_i)
         second, _ = _frame_of(self.axis_j, self.vector_j)
-        turned = body_i.direction(first).dot(body_j.direction(second))
-        return rows(offset, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j), turned)
+        cosine = body_i.direction(first).dot(body_j.direction(second))
+        return rows(offset, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j), cosine)
 
 
 class Rolling(AbstractConstraint, type="rolling", space="spatial"):
@@ -129,12 +129,12 @@ class Rolling(AbstractConstraint, type="rolling", space="spatial"):
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         travel = slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
         turn = relative_angle(body_i, body_j, self.axis_i, datum=coaxial(self.axis_i, self.axis_j))
-        rolled = wrap(travel - self.radius * turn - self.offset, 2 * jnp.pi * self.radius)
+        gap = wrap(travel - self.radius * turn - self.offset, 2 * jnp.pi * self.radius)
         if self.flank is None or self.pressure_angle is None:
-            return rolled
+            return gap
         across = cross(self.vector_i, self.axis_i)
         clearance = slide(body_i, body_j, self.point_i, self.point_j, across) - self.radius
-        return rolled - self.flank * jnp.tan(self.pressure_angle) * clearance
+        return gap - self.flank * jnp.tan(self.pressure_angle) * clearance
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
         """Return the angular velocity of the pinion about its axis relative to the rack, rad/s."""
@@ -201,15 +201,15 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
 
     def variation(self, bodies: tuple[Any, ...], changes: tuple[Any, ...], time: Jet) -> Jet:
         """Return the variation of the residual; with a flank, including the gap of the teeth, which stays zero."""
-        turned = super().variation(bodies, changes, time)
+        base = super().variation(bodies, changes, time)
         if self.flank is None or self.pressure_angle is None:
-            return turned
+            return base
         moving, (place, along, axes, arms) = displacements(bodies, changes), self._mesh(bodies)
         parted = [
             velocity_at(body, twist, place) - arm * axis.dot(twist[1] - moving[2][1])
             for body, twist, axis, arm in zip(bodies[:2], moving, axes, arms, strict=False)
         ]
-        return turned + along.dot(parted[1] - parted[0])
+        return base + along.dot(parted[1] - parted[0])
 
     def _mesh(self, bodies: tuple[Any, ...]) -> tuple[Jet, Jet, list[Jet], list[Jet]]:
         """Return the pitch point, the tooth force per multiplier, the axes, and the `arms` of the pitch point."""
@@ -263,8 +263,8 @@ class PitchPoint(NamedTuple):
         points = [b.point(point) for b, point in zip(bodies[:2], (gear.point_i, gear.point_j), strict=True)]
         arms = [cross(axis, place - point) for axis, point in zip(axes, points, strict=True)]
         sliding = arms[0] - arms[1] * gear.ratio
-        square, least = (x.dot(x).coefficients[0] for x in (sliding, arms[0]))
-        rolls = square <= ROLLING**2 * least
+        square, scale = (x.dot(x).coefficients[0] for x in (sliding, arms[0]))
+        rolls = square <= ROLLING**2 * scale
         # the plane contains the line on which gears roll, or, if they slide, the velocities of both gears
         other = where(rolls, axes[0] - axes[1] * gear.ratio, arms[1])
         normal = unit(cross(arms[0], other))

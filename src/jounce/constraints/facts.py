@@ -187,24 +187,24 @@ def facts_of(kind: type[Any]) -> Facts:
     return facts
 
 
-def _of_field(kind: type[Any], fact: str, field: str, otherwise: Any) -> Any:
+def _of_field(kind: type[Any], fact: str, field: str, default: Any) -> Any:
     """Return the fact of a field from the first class that states it, in method resolution order."""
     for base in kind.__mro__:
-        stated = vars(base).get(fact, {})
-        if not isinstance(stated, Mapping):
+        declared = vars(base).get(fact, {})
+        if not isinstance(declared, Mapping):
             message = f"the class {base.__qualname__} must state this by field, in a dictionary"
-            raise MechanismError(message, name=fact, value=stated)
+            raise MechanismError(message, name=fact, value=declared)
         for name in (field, stem_of(field)):
-            if name in stated:
-                return stated[name]
-    return otherwise
+            if name in declared:
+                return declared[name]
+    return default
 
 
 def _pairs(kind: type[Any], fact: str) -> tuple[tuple[str, str], ...]:
     """Return the pairs of fields that a class states, checked."""
     pairs = getattr(kind, fact, ())
-    for both in pairs:
-        if isinstance(both, str) or len(both) != 2:
+    for pair in pairs:
+        if isinstance(pair, str) or len(pair) != 2:
             message = f"the class {kind.__qualname__} must state pairs of fields, such as (('axis_i', 'axis_j'),)"
             raise MechanismError(message, name=fact, value=pairs)
     return tuple((first, second) for first, second in pairs)
@@ -223,9 +223,9 @@ def _of_residual(kind: type[Any], fact: str) -> str:
 def _check(kind: type[Any], facts: Facts, fields: tuple[str, ...]) -> None:
     """Raise MechanismError if a class states an impossible fact."""
 
-    def must_be(fact: str, word: str, known: Any, noun: str) -> None:
-        if word not in known:
-            message = f"the class {kind.__qualname__}: {no_such(noun, word, list(known))}"
+    def must_be(fact: str, word: str, valid: Any, noun: str) -> None:
+        if word not in valid:
+            message = f"the class {kind.__qualname__}: {no_such(noun, word, list(valid))}"
             raise MechanismError(message, name=fact, value=word)
 
     for fact, name in _named_fields(facts):
@@ -251,7 +251,7 @@ def _check(kind: type[Any], facts: Facts, fields: tuple[str, ...]) -> None:
 def _named_fields(facts: Facts) -> Iterator[tuple[str, str]]:
     """Yield the names of facts of a class, each with a field that it names."""
     for fact in ("held_parallel", "never_parallel"):
-        yield from ((fact, name) for both in getattr(facts, fact) for name in both)
+        yield from ((fact, name) for pair in getattr(facts, fact) for name in pair)
     if facts.squared_distance:
         yield "squared_distance", facts.squared_distance
     if facts.point_distance and not facts.pair:
@@ -267,9 +267,9 @@ def _stated_fields(kind: type[Any]) -> Iterator[tuple[str, str]]:
     """
     for base in kind.__mro__:
         for fact in ("dimensions", "signs", "choices"):
-            stated = vars(base).get(fact, {})
-            if stated is not USUAL_SIGNS and stated is not USUAL_DIMENSIONS:
-                yield from ((fact, name) for name in stated)
+            declared = vars(base).get(fact, {})
+            if declared is not USUAL_SIGNS and declared is not USUAL_DIMENSIONS:
+                yield from ((fact, name) for name in declared)
 
 
 def symbols(kind: type[Any]) -> tuple[str, ...]:
@@ -292,7 +292,7 @@ def stem_of(field: str) -> str:
     return field[:-2] if field[-2:] in BODY_ENDINGS else field
 
 
-def has_other_sign(sign: str, least: Any, largest: Any) -> Any:
+def has_other_sign(sign: str, smallest: Any, largest: Any) -> Any:
     """Return whether values lack the required sign, given their least entries and largest magnitudes.
 
     Examples
@@ -302,21 +302,21 @@ def has_other_sign(sign: str, least: Any, largest: Any) -> Any:
     """
     match sign:
         case "positive":
-            return least <= 0
+            return smallest <= 0
         case "not negative":
-            return least < 0
+            return smallest < 0
         case "not zero":
             return largest == 0
         case "pressure angle":
-            return least < 0 or largest > math.pi / 4
+            return smallest < 0 or largest > math.pi / 4
         case "lead angle":
-            return least <= 0 or largest >= math.pi / 2
+            return smallest <= 0 or largest >= math.pi / 2
         case "helix angle":
             return largest >= math.pi / 2
         case "efficiency":
-            return least <= 0 or largest > 1
+            return smallest <= 0 or largest > 1
         case "at most 1":
-            return least > 1
+            return smallest > 1
     return False
 
 
@@ -340,8 +340,8 @@ def dimension_of_field(element: Any, field: str) -> str:
     >>> dimension_of_field(drivers.CoordinateDriver(("ground", "crank"), "angle", motion="t"), "motion")
     'angle'
     """
-    stated = facts_of(type(element)).dimensions.get(field, "any")
-    return at_coordinate(stated, getattr(element, "coordinate", ""))
+    dimension = facts_of(type(element)).dimensions.get(field, "any")
+    return at_coordinate(dimension, getattr(element, "coordinate", ""))
 
 
 @lru_cache(maxsize=1000)

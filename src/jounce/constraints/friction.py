@@ -147,8 +147,8 @@ class GearFriction(Module):
         if self.coefficient is not None and self.lead_angle is None:
             message = "is missing: the efficiency of a worm follows from its coefficient and its lead angle"
             raise MechanismError(message, name="lead_angle")
-        wrong = ("lead_angle", "pressure_angle") if self.coefficient is None else ("backward",)
-        for name in wrong:
+        fields = ("lead_angle", "pressure_angle") if self.coefficient is None else ("backward",)
+        for name in fields:
             if getattr(self, name) is not None:
                 message = f"does not go with {given[0]}: leave it out"
                 raise MechanismError(message, name=name, value=getattr(self, name))
@@ -160,17 +160,17 @@ class GearFriction(Module):
         At rest, the loss may be any torque within the mean on both sides of half the difference.
         """
         forward, backward = self.efficiencies
-        onward, back = 1.0 / forward - 1.0, 1.0 - backward
-        return 0.5 * (onward + back), 0.5 * (onward - back)
+        forward_loss, backward_loss = 1.0 / forward - 1.0, 1.0 - backward
+        return 0.5 * (forward_loss + backward_loss), 0.5 * (forward_loss - backward_loss)
 
     @property
     def efficiencies(self) -> tuple[Any, Any]:
         """Efficiencies if gear i drives gear j, and if gear j drives gear i."""
         if self.coefficient is None:
             return self.efficiency, self.efficiency if self.backward is None else self.backward
-        of = jnp if is_traced((self.coefficient, self.pressure_angle, self.lead_angle)) else np
-        slope = self.coefficient if self.pressure_angle is None else self.coefficient / of.cos(self.pressure_angle)
-        rise = of.tan(self.lead_angle)
+        xp = jnp if is_traced((self.coefficient, self.pressure_angle, self.lead_angle)) else np
+        slope = self.coefficient if self.pressure_angle is None else self.coefficient / xp.cos(self.pressure_angle)
+        rise = xp.tan(self.lead_angle)
         return rise * (1.0 - slope * rise) / (rise + slope), (rise - slope) / (rise * (1.0 + slope * rise))
 
     def resisting(self, slip: Float[Jet, "direction *batch"]) -> Float[Jet, "direction *batch"]:
@@ -193,13 +193,13 @@ def friction_class(kind: type[Any]) -> type[Any]:
 
 def _tanh_of_root(square: Jet) -> Jet:
     """Return ``tanh(x) / x`` from the square of x; smooth at zero, unlike the root."""
-    near = square.coefficients[0] < NEAR
-    small, large = (where(condition, square, 1e-2) for condition in (near, ~near))
+    is_small = square.coefficients[0] < NEAR
+    small, large = (where(condition, square, 1e-2) for condition in (is_small, ~is_small))
     series = small * 0.0
     for term in _terms()[::-1]:
         series = series * small + term
     root = sqrt(large)
-    return where(near, series, _tanh(root) / root)
+    return where(is_small, series, _tanh(root) / root)
 
 
 def _tanh(x: Jet) -> Jet:
@@ -208,8 +208,8 @@ def _tanh(x: Jet) -> Jet:
     The recurrence by ``1 - tanh^2`` loses them, and makes steps of simulations short far above the speed.
     """
     side = jnp.where(x.coefficients[0] < 0, -1.0, 1.0)
-    left = exp(x * (-2.0 * side))
-    return (1.0 - left) / (1.0 + left) * side
+    decay = exp(x * (-2.0 * side))
+    return (1.0 - decay) / (1.0 + decay) * side
 
 
 def _terms() -> list[float]:
@@ -222,8 +222,8 @@ def _terms() -> list[float]:
 
 def where(condition: Any, jet: Jet, other: Any) -> Jet:
     """Return a jet where a condition holds, and another jet or a constant elsewhere."""
-    others = other if isinstance(other, Jet) else Jet.constant(jnp.full_like(jet.coefficients[0], other), jet.order)
-    pairs = zip(jet.dense().coefficients, others.dense().coefficients, strict=True)
+    other_jet = other if isinstance(other, Jet) else Jet.constant(jnp.full_like(jet.coefficients[0], other), jet.order)
+    pairs = zip(jet.dense().coefficients, other_jet.dense().coefficients, strict=True)
     return Jet(tuple(jnp.where(condition, a, b) for a, b in pairs))
 
 
@@ -280,8 +280,8 @@ def displacements(bodies: Sequence[Pose], changes: Sequence[Any]) -> Velocities:
     velocities = []
     for body, change in zip(bodies, changes, strict=True):
         if change is None:
-            still = Jet.constant(jnp.zeros_like(body.position.coefficients[0]), body.order)
-            velocities.append((still, still[0] if isinstance(body, PlanarPose) else still))
+            zero = Jet.constant(jnp.zeros_like(body.position.coefficients[0]), body.order)
+            velocities.append((zero, zero[0] if isinstance(body, PlanarPose) else zero))
         elif isinstance(body, PlanarPose):
             velocities.append((change.position, change.angle))
         else:

@@ -300,8 +300,8 @@ def _turned(joint: Any, body_i: PlanarPose, body_j: PlanarPose, line: Jet, ratio
 def _center_offset(d: Jet, distance: Any) -> Any:
     """Return an offset for gear centers that coincide in a guess, where the line of centers is undefined."""
     value = d.coefficients[0]
-    together = (value == 0).all(axis=0)
-    return jnp.where(together, jnp.abs(distance), 0.0)[None] * np.array([1.0, 0.0]).reshape(2, *[1] * together.ndim)
+    coincide = (value == 0).all(axis=0)
+    return jnp.where(coincide, jnp.abs(distance), 0.0)[None] * np.array([1.0, 0.0]).reshape(2, *[1] * coincide.ndim)
 
 
 class Belt(AbstractConstraint, type="belt", space="planar"):
@@ -381,12 +381,12 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         travel = slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
-        rolled = travel - self.radius * (body_j.angle - body_i.angle) - self.offset
+        gap = travel - self.radius * (body_j.angle - body_i.angle) - self.offset
         if self.flank is None or self.pressure_angle is None:
-            return rolled
+            return gap
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         aside = cross(body_i.direction(self.vector_i), d) / length_of(self.vector_i)
-        return rolled + self.flank * jnp.tan(self.pressure_angle) * (aside + self.radius)
+        return gap + self.flank * jnp.tan(self.pressure_angle) * (aside + self.radius)
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
         """Return the angular velocity of the disc relative to the line, rad/s."""

@@ -77,8 +77,8 @@ def distinct(bodies: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[int, ...]]
     >>> distinct(("a", "ground", "ground", "b"))
     (('a', 'ground', 'b'), (0, 1, 1, 2))
     """
-    once = tuple(dict.fromkeys(bodies))
-    return once, tuple(map(once.index, bodies))
+    names = tuple(dict.fromkeys(bodies))
+    return names, tuple(map(names.index, bodies))
 
 
 def shares_points(element: Any) -> bool:

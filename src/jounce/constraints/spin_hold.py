@@ -28,10 +28,10 @@ class SpinHold(AbstractConstraint):
         return body.turning(change).dot(self.axis / length_of(self.axis)[None])
 
     def residual(self, body: SpatialPose, time: Jet) -> Jet:
-        still = jnp.zeros_like(body.position.coefficients[0][0])
+        zero = jnp.zeros_like(body.position.coefficients[0][0])
         if body.order == 0 or body.angular_velocity is None:
-            spun = Jet.constant(still, body.order)
+            turn = Jet.constant(zero, body.order)
         else:
             axis = self.axis / length_of(self.axis)[None]
-            spun = body.angular_velocity.dot(axis).integrate(still)
-        return spun - self.rate * (time - time.coefficients[0])
+            turn = body.angular_velocity.dot(axis).integrate(zero)
+        return turn - self.rate * (time - time.coefficients[0])

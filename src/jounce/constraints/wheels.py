@@ -35,27 +35,27 @@ class Wheel(AbstractConstraint, type="wheel", space="spatial"):
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         height = self._height(body_i, body_j)
-        nothing, order = jnp.zeros_like(height.coefficients[0]), body_j.order
+        zeros, order = jnp.zeros_like(height.coefficients[0]), body_j.order
         if order == 0:
-            return rows(height, *[Jet.constant(nothing, 0)] * 2)
+            return rows(height, *[Jet.constant(zeros, 0)] * 2)
         moving = [(body.position.differentiate(), body.global_angular_velocity()) for body in (body_i, body_j)]
         slip = self._slip(body_i.truncate(order - 1), body_j.truncate(order - 1), moving)
-        return rows(height, *(part.integrate(nothing) for part in slip))
+        return rows(height, *(part.integrate(zeros) for part in slip))
 
     def variation(self, bodies: tuple[Any, ...], changes: tuple[Any, ...], time: Jet) -> Jet:
         """Return the variation of the height, and the slip of the touching points by displacements."""
         varied = [k for k, change in enumerate(changes) if change is not None]
 
         def height(*poses: Any) -> Jet:
-            placed = list(bodies)
+            displaced = list(bodies)
             for k, pose in zip(varied, poses, strict=True):
-                placed[k] = pose
-            return self._height(*placed)
+                displaced[k] = pose
+            return self._height(*displaced)
 
         raised = jax.jvp(height, tuple(bodies[k] for k in varied), tuple(changes[k] for k in varied))[1]
-        still = Jet.constant(jnp.zeros_like(bodies[0].position.coefficients[0]), bodies[0].order)
+        zero = Jet.constant(jnp.zeros_like(bodies[0].position.coefficients[0]), bodies[0].order)
         moving = [
-            (still, still) if change is None else (change.position, body.direction(body.turning(change)))
+            (zero, zero) if change is None else (change.position, body.direction(body.turning(change)))
             for body, change in zip(bodies, changes, strict=True)
         ]
         body_i, body_j = bodies

@@ -297,8 +297,8 @@ def concatenate(parts: Sequence[Jet | Numbers]) -> Any:
     if not jets:
         return jnp.concatenate(_broadcast_batch(parts))
     order = min(jet.order for jet in jets)
-    whole = [part if isinstance(part, Jet) else Jet.constant(part, order) for part in parts]
-    first = _broadcast_batch([jet.coefficients[0] for jet in whole])
+    operands = [part if isinstance(part, Jet) else Jet.constant(part, order) for part in parts]
+    first = _broadcast_batch([jet.coefficients[0] for jet in operands])
     shapes = [jnp.shape(value) for value in first]
 
     def level(coefficients: tuple[Any, ...]) -> Any:
@@ -307,7 +307,7 @@ def concatenate(parts: Sequence[Jet | Numbers]) -> Any:
         pairs = zip(coefficients, shapes, strict=True)
         return jnp.concatenate([jnp.zeros(s) if c is None else jnp.broadcast_to(c, s) for c, s in pairs])
 
-    rest = zip(*(jet.coefficients[1 : order + 1] for jet in whole), strict=True)
+    rest = zip(*(jet.coefficients[1 : order + 1] for jet in operands), strict=True)
     return Jet((jnp.concatenate(first), *map(level, rest)))
 
 
@@ -371,12 +371,12 @@ def real_power(x: Jet, exponent: Real) -> Jet:
     """
     at_zero = x.coefficients[0] == 0
     c = (jnp.where(at_zero, 1.0, x.coefficients[0]), *x.coefficients[1:])
-    whole = [whole_power(x, m).dense() for m in range(x.order + 1)]
-    beyond = exponent > x.order  # at a base of zero all coefficients vanish; for other real exponents they are NaN
+    integer_powers = [whole_power(x, m).dense() for m in range(x.order + 1)]
+    vanishes = exponent > x.order  # at a base of zero all coefficients vanish; for other real exponents they are NaN
 
     def coefficient(k: int, value: Any) -> Any:
-        value = jnp.where(at_zero, jnp.where(beyond | ((exponent > 0) & (k == 0)), 0.0, jnp.nan), value)
-        for m, power_m in enumerate(whole):
+        value = jnp.where(at_zero, jnp.where(vanishes | ((exponent > 0) & (k == 0)), 0.0, jnp.nan), value)
+        for m, power_m in enumerate(integer_powers):
             value = jnp.where(exponent == m, power_m.coefficients[k], value)
         return value
 

@@ -60,8 +60,8 @@ def _plain(x: Any) -> Any:
         return float(x)
     if kind is np.ndarray:
         return x if x.dtype == _FLOAT else None
-    known = getattr(x, "aval", None)  # of JAX arrays and tracers
-    return x if known is not None and known.dtype == _FLOAT and not known.weak_type else None
+    aval = getattr(x, "aval", None)  # of JAX arrays and tracers
+    return x if aval is not None and aval.dtype == _FLOAT and not aval.weak_type else None
 
 
 added = _elementwise(jax.lax.add, jnp.add)
@@ -144,9 +144,9 @@ def self_convolution(product: Product, a: Coefficients) -> list[Any]:
     terms = []
     for k in range(len(a)):
         half = (k + 1) // 2
-        twice = sum_of_products(product, a[:half], a[k : k - half : -1] if half else ())
+        double = sum_of_products(product, a[:half], a[k : k - half : -1] if half else ())
         middle = sum_of_products(product, a[k // 2 : k // 2 + 1], a[k // 2 : k // 2 + 1]) if k % 2 == 0 else None
-        terms.append(plus(None if twice is None else multiplied(twice, 2.0), middle))
+        terms.append(plus(None if double is None else multiplied(double, 2.0), middle))
     return terms
 
 
@@ -155,8 +155,8 @@ def quotient(a: Coefficients, b: Coefficients) -> list[Any]:
     first, *others = b
     coefficients: list[Any] = []
     for k in range(min(len(a), len(b))):
-        rest = minus(a[k], sum_of_products(multiplied, others[:k], coefficients[::-1]))
-        coefficients.append(None if rest is None else divided(rest, first))
+        remainder = minus(a[k], sum_of_products(multiplied, others[:k], coefficients[::-1]))
+        coefficients.append(None if remainder is None else divided(remainder, first))
     return coefficients
 
 
@@ -172,8 +172,8 @@ def square_root(x: Coefficients) -> list[Any]:
     """Return the coefficients of the square root of a series."""
     y: list[Any] = [jnp.sqrt(x[0])]
     for k in range(1, len(x)):
-        rest = minus(x[k], sum_of_products(multiplied, y[1:k], y[k - 1 : 0 : -1]))
-        y.append(None if rest is None else divided(rest, multiplied(y[0], 2.0)))
+        remainder = minus(x[k], sum_of_products(multiplied, y[1:k], y[k - 1 : 0 : -1]))
+        y.append(None if remainder is None else divided(remainder, multiplied(y[0], 2.0)))
     return y
 
 

@@ -86,9 +86,9 @@ def _hyperbolic(x: Jet) -> tuple[Jet, Jet]:
     half = jnp.exp(jnp.maximum(jnp.abs(value), 1.0) / 2)
     large = 0.5 * half * half
     small = 0.25 / large
-    far = jnp.abs(value) > 1
-    sine = jnp.where(far, jnp.sign(value) * (large - small), jnp.sinh(value))
-    return _sine_cosine_from(x, (sine, jnp.where(far, large + small, jnp.cosh(value))), hyperbolic=True)
+    is_large = jnp.abs(value) > 1
+    sine = jnp.where(is_large, jnp.sign(value) * (large - small), jnp.sinh(value))
+    return _sine_cosine_from(x, (sine, jnp.where(is_large, large + small, jnp.cosh(value))), hyperbolic=True)
 
 
 @of_quantities(jnp.sinh)

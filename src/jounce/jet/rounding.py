@@ -17,14 +17,14 @@ Rates = Float[Numbers, "*batch"]
 
 def sizes(jet: Jet, batch: int) -> list[Rates]:
     """Return the norms of the first coefficients of a jet with `batch` trailing axes after its components."""
-    whole = jet.dense().coefficients[: COEFFICIENTS + 1]
-    return [jnp.sqrt(jnp.sum(c * c, axis=0)) if jnp.ndim(c) > batch else jnp.abs(c) for c in whole]
+    coefficients = jet.dense().coefficients[: COEFFICIENTS + 1]
+    return [jnp.sqrt(jnp.sum(c * c, axis=0)) if jnp.ndim(c) > batch else jnp.abs(c) for c in coefficients]
 
 
-def growth(coefficient_sizes: list[Rates], of: Real) -> Rates:
+def growth(coefficient_sizes: list[Rates], base: Real) -> Rates:
     """Return the growth rate of coefficients from order 1 on, relative to a size of order zero, 1/s."""
-    rates = [jnp.power(size / of, 1.0 / k) for k, size in enumerate(coefficient_sizes, 1)]
-    return jnp.max(jnp.stack(rates), axis=0) if rates else jnp.zeros_like(jnp.asarray(of))
+    rates = [jnp.power(size / base, 1.0 / k) for k, size in enumerate(coefficient_sizes, 1)]
+    return jnp.max(jnp.stack(rates), axis=0) if rates else jnp.zeros_like(jnp.asarray(base))
 
 
 def nan_where_rounding(
@@ -49,8 +49,8 @@ def nan_where_rounding(
     coefficients = []
     for k, c in enumerate(result.dense().coefficients):
         largest = (LARGEST_ERROR / ROUNDING) ** (1.0 / max(k + lost, 1))
-        known = nearness <= largest * rate  # false for a growth rate of NaN
-        coefficients.append(jnp.where(with_rank(known if also is None else known & also, jnp.ndim(c)), c, jnp.nan))
+        mask = nearness <= largest * rate  # false for a growth rate of NaN
+        coefficients.append(jnp.where(with_rank(mask if also is None else mask & also, jnp.ndim(c)), c, jnp.nan))
     return Jet(coefficients)
 
 
@@ -60,11 +60,11 @@ def nan_where_rounding_in_plane(angle: Jet, projection: Jet, line: Jet, normal: 
     A moving plane has a unit normal, in the axes of the line; the projection then moves with both.
     """
     batch = jnp.ndim(angle.coefficients[0])
-    flat, whole = sizes(projection, batch), sizes(line, batch)
-    rate = growth(whole[1:], whole[0])
+    flat, lengths = sizes(projection, batch), sizes(line, batch)
+    rate = growth(lengths[1:], lengths[0])
     if normal is not None:
         rate = jnp.maximum(rate, growth(sizes(normal, batch)[1:], jnp.ones_like(rate)))
-    return nan_where_rounding(angle, growth(flat[1:], flat[0]), rate, also=flat[0] > SMALLEST * whole[0])
+    return nan_where_rounding(angle, growth(flat[1:], flat[0]), rate, also=flat[0] > SMALLEST * lengths[0])
 
 
 def rates_of(speed: Jet, scale: Rates, batch: int) -> tuple[Rates, Rates]:
@@ -78,10 +78,10 @@ def rates_of(speed: Jet, scale: Rates, batch: int) -> tuple[Rates, Rates]:
         Size of the quantity itself; 1 rad for an angle.
     """
     speed_sizes = sizes(speed, batch)
-    own = [size / k for k, size in enumerate(speed_sizes, 1)][:COEFFICIENTS]
-    rate = growth([jnp.zeros_like(own[0]), *own[1:]], scale)
-    later = [growth(own[k + 1 :], own[k]) for k in (1, 2) if len(own) > k + 1]
-    if later:
-        least = jnp.min(jnp.stack([jnp.where(jnp.isnan(x), 0.0, x) for x in later]), axis=0)
-        rate = jnp.maximum(rate, jnp.where(jnp.isfinite(least), least, 0.0))
+    ratios = [size / k for k, size in enumerate(speed_sizes, 1)][:COEFFICIENTS]
+    rate = growth([jnp.zeros_like(ratios[0]), *ratios[1:]], scale)
+    later_ratios = [growth(ratios[k + 1 :], ratios[k]) for k in (1, 2) if len(ratios) > k + 1]
+    if later_ratios:
+        smallest = jnp.min(jnp.stack([jnp.where(jnp.isnan(x), 0.0, x) for x in later_ratios]), axis=0)
+        rate = jnp.maximum(rate, jnp.where(jnp.isfinite(smallest), smallest, 0.0))
     return growth(speed_sizes[1:COEFFICIENTS], speed_sizes[0]), rate

@@ -77,10 +77,10 @@ def carriage_guess(curve: CurveLaw, start: Any, point: Any) -> Any:
                 message = f"the start must be between the ends of the curve, {low:.6g} and {high:.6g}"
                 raise MechanismError(message, name="start", value=float(value))
     parts = [x * curve.unit for x in start]
-    whole = (*parts, *[0.0] * (count - 1 - len(parts)), curve.unit)
-    if any(isinstance(x, Tracer) for x in whole):
-        return jnp.stack([jnp.asarray(x, float) for x in whole])
-    return np.array([float(x) for x in whole])
+    position = (*parts, *[0.0] * (count - 1 - len(parts)), curve.unit)
+    if any(isinstance(x, Tracer) for x in position):
+        return jnp.stack([jnp.asarray(x, float) for x in position])
+    return np.array([float(x) for x in position])
 
 
 def _is_curve(curve: CurveLaw) -> bool:
@@ -98,36 +98,36 @@ def _nearest(curve: CurveLaw, point: Any) -> Any:
     grid = np.linspace(low, high, SAMPLES)
     if any(isinstance(x, Tracer) for x in jax.tree.leaves((curve, point))):  # checked below before JAX traced it
         points = curve(Jet([jnp.asarray(grid)])).coefficients[0]
-        far = jnp.sum((points - jnp.asarray(point)[:, None]) ** 2, axis=0)
-        return jnp.asarray(grid)[jnp.nanargmin(far)]
+        grid_distances = jnp.sum((points - jnp.asarray(point)[:, None]) ** 2, axis=0)
+        return jnp.asarray(grid)[jnp.nanargmin(grid_distances)]
 
     derivatives = partial(derivatives_at, curve.components)
     points = derivatives(grid)[0]
     size = float(np.ptp(np.where(np.isfinite(points), points, 0.0), axis=1).max()) or 1.0
-    far = np.linalg.norm(points - np.asarray(point)[:, None], axis=0)
-    far = np.where(np.isfinite(far), far, np.inf)
-    before, after = np.append(np.inf, far[:-1]), np.append(far[1:], np.inf)
-    near = np.flatnonzero((far <= before) & (far <= after) & np.isfinite(far))
+    grid_distances = np.linalg.norm(points - np.asarray(point)[:, None], axis=0)
+    grid_distances = np.where(np.isfinite(grid_distances), grid_distances, np.inf)
+    before, after = np.append(np.inf, grid_distances[:-1]), np.append(grid_distances[1:], np.inf)
+    minima = np.flatnonzero((grid_distances <= before) & (grid_distances <= after) & np.isfinite(grid_distances))
     step = (high - low) / (SAMPLES - 1)
-    lower, upper = np.maximum(grid[near] - step, low), np.minimum(grid[near] + step, high)
+    lower, upper = np.maximum(grid[minima] - step, low), np.minimum(grid[minima] + step, high)
     for _ in range(STEPS):  # ternary search
         a, b = lower + (upper - lower) / 3, upper - (upper - lower) / 3
         sizes = np.split(np.linalg.norm(derivatives(np.concatenate([a, b]))[0] - np.asarray(point)[:, None], axis=0), 2)
-        nearer = sizes[0] < sizes[1]
-        lower, upper = np.where(nearer, lower, a), np.where(nearer, b, upper)
+        is_lower = sizes[0] < sizes[1]
+        lower, upper = np.where(is_lower, lower, a), np.where(is_lower, b, upper)
     parameter = 0.5 * (lower + upper)
     points = derivatives(parameter)[0]
     distances = np.linalg.norm(points - np.asarray(point)[:, None], axis=0)
     ranked = np.lexsort((np.abs(parameter), np.round(distances / (SLIGHT * size))))
     best = int(ranked[0])
     for k in ranked[1:]:
-        elsewhere = np.linalg.norm(points[:, k] - points[:, best]) > 100 * SLIGHT * size
+        is_apart = np.linalg.norm(points[:, k] - points[:, best]) > 100 * SLIGHT * size
         crossing = (
-            not elsewhere
+            not is_apart
             and distances[best] < SLIGHT * size
             and _turned(derivatives, float(parameter[best]), float(parameter[k]))
         )
-        if (elsewhere or crossing) and distances[k] <= ALIKE * distances[best] + SLIGHT * size:
+        if (is_apart or crossing) and distances[k] <= ALIKE * distances[best] + SLIGHT * size:
             names = " and ".join(f"s = {parameter[j]:.4g}" for j in sorted((best, int(k)), key=lambda j: parameter[j]))
             message = f"two parts of the curve are about as near to the starting guess, at {names}; give start"
             raise MechanismError(message, name="start")
@@ -152,11 +152,11 @@ def has_ends(mechanism: Any) -> bool:
     return any(not curve.closed and getattr(curve, "range", curve) is not None for curve in curves)
 
 
-def check_without_ends(mechanism: Any, what: str) -> None:
-    """Raise UnsupportedError if a mechanism has curves with ends, which `what` does not detect."""
+def check_without_ends(mechanism: Any, request: str) -> None:
+    """Raise UnsupportedError if a mechanism has curves with ends, which `request` does not detect."""
     if has_ends(mechanism):
         message = (
-            f"{what} does not look for the ends of curves yet, and would go on beyond; give a curve without a range"
+            f"{request} does not look for the ends of curves yet, and would go on beyond; give a curve without a range"
         )
         raise UnsupportedError(message, name="joints")
 
@@ -167,10 +167,10 @@ def with_carriages(bodies: Mapping[str, Any], joints: Mapping[str, Any], kind: t
     `kind` is the class of carriages; the position of a new carriage is None, as it follows from the starting guess.
     """
     names = [carriage for name, joint in joints.items() for carriage in carriages(name, joint)]
-    own = {name: body for name, body in bodies.items() if not isinstance(body, kind)}
-    if not names and len(own) == len(bodies):
+    user_bodies = {name: body for name, body in bodies.items() if not isinstance(body, kind)}
+    if not names and len(user_bodies) == len(bodies):
         return bodies
-    for name in (name for name in names if name in own):
+    for name in (name for name in names if name in user_bodies):
         message = "this name is that of the carriage of a joint; give the body another one"
         raise MechanismError(message, name=f"bodies.{name}")
-    return {**own, **{name: bodies.get(name) or kind(None) for name in names}}
+    return {**user_bodies, **{name: bodies.get(name) or kind(None) for name in names}}

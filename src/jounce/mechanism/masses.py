@@ -57,10 +57,10 @@ def body_mass(
             raise MechanismError("must not be negative", name=f"{location}.{field}", value=float(value))
     if solid and components == 3 and not isinstance(inertia, Tracer):
         try:
-            whole = Inertia(1.0, tensor=inertia, strict=False)
+            unit_mass = Inertia(1.0, tensor=inertia, strict=False)
         except RobotError as error:
             raise MechanismError(error.message, name=f"{location}.inertia", value=error.value) from None
-        if fault := whole.fault:
+        if fault := unit_mass.fault:
             raise MechanismError(f"{fault.words}; {ADVICE}", name=f"{location}.inertia", value=fault.value)
-        inertia = whole.tensor
+        inertia = unit_mass.tensor
     return mass, center, inertia

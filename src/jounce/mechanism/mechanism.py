@@ -90,9 +90,9 @@ class Body:
             if self.mass is not None or self.center_of_mass is not None:
                 message = "an Inertia contains the mass and the center of mass; do not give them besides"
                 raise MechanismError(message, name="inertia")
-            whole, planar = self.inertia, len(self.position) == 2
-            tensor = float(whole.tensor[2, 2]) if planar else whole.tensor
-            derived = {"mass": whole.mass, "center_of_mass": whole.center_of_mass[: 2 if planar else 3]}
+            inertia, planar = self.inertia, len(self.position) == 2
+            tensor = float(inertia.tensor[2, 2]) if planar else inertia.tensor
+            derived = {"mass": inertia.mass, "center_of_mass": inertia.center_of_mass[: 2 if planar else 3]}
             for name, value in {**derived, "inertia": tensor}.items():
                 object.__setattr__(self, name, value)
 
@@ -247,14 +247,14 @@ class Mechanism(Displayed):
                 raise MechanismError(message, name=f"initial.{name}")
 
     def _check_assembly(self) -> None:
-        wish = self.assembly
-        if isinstance(wish, Mapping) and wish:
-            for body, side in wish.items():
+        assembly = self.assembly
+        if isinstance(assembly, Mapping) and assembly:
+            for body, side in assembly.items():
                 check_name("body", body, tuple(self.bodies), MechanismError, name=f"assembly.{body}")
                 check_choice(f"assembly.{body}", side, tuple(SIDES), MechanismError)
-        elif wish is not None and wish != NEAREST and not (type(wish) is int and wish > 0):
+        elif assembly is not None and assembly != NEAREST and not (type(assembly) is int and assembly > 0):
             message = f"must be a number from 1, {NEAREST}, or for bodies one of {', '.join(SIDES)}"
-            raise MechanismError(message, name="assembly", value=wish)
+            raise MechanismError(message, name="assembly", value=assembly)
 
     def _check_element(self, kind: str, name: str, element: Any) -> None:
         location = f"{kind}.{name}"
@@ -305,21 +305,21 @@ class Mechanism(Displayed):
             If a value is not one finite number, or expressions form a circle.
         """
         values = {k: parameter_value(k, v) for k, v in self.parameters.items() if not isinstance(v, Expression)}
-        waiting = {k: v for k, v in self.parameters.items() if isinstance(v, Expression)}
-        while waiting:
-            ready = [k for k, v in waiting.items() if v.names <= values.keys()]
+        pending = {k: v for k, v in self.parameters.items() if isinstance(v, Expression)}
+        while pending:
+            ready = [k for k, v in pending.items() if v.names <= values.keys()]
             for name in ready:
                 try:
-                    values[name] = waiting.pop(name).evaluate(values)
+                    values[name] = pending.pop(name).evaluate(values)
                 except ExpressionError as error:
                     raise error.located(name=f"parameters.{name}") from None
             if not ready:
-                name, expression = next(iter(waiting.items()))
+                name, expression = next(iter(pending.items()))
                 try:
                     expression.check(self.parameters)
                 except ExpressionError as error:
                     raise error.located(name=f"parameters.{name}") from None
-                message = f"parameters depend on each other in a circle: {', '.join(waiting)}"
+                message = f"parameters depend on each other in a circle: {', '.join(pending)}"
                 raise MechanismError(message, name=f"parameters.{name}")
         return values
 
@@ -390,8 +390,8 @@ def check_output_name(given: object, error: type[JounceError], **location: Any) 
         raise error("the name of an output is text that is not empty", value=given, **location)
     if names_column(given):
         rate = RATE_COLUMN.fullmatch(given) is not None
-        why = f", where '_d' and a number mean a derivative of '{given.rpartition('_d')[0]}'" if rate else ""
-        raise error(f"the name '{given}' is reserved for columns of the results{why}; give another one", **location)
+        reason = f", where '_d' and a number mean a derivative of '{given.rpartition('_d')[0]}'" if rate else ""
+        raise error(f"the name '{given}' is reserved for columns of the results{reason}; give another one", **location)
 
 
 def check_mechanism(given: object) -> None:

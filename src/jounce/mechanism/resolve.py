@@ -91,10 +91,10 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
     raise MechanismError("a motion is an expression, a function of time or a motion law", value=motion)
 
 
-def _check_names(expression: Expression, own: set[str], parameters: Mapping[str, Any]) -> None:
+def _check_names(expression: Expression, variables: set[str], parameters: Mapping[str, Any]) -> None:
     """Raise ExpressionError for a name that is neither a parameter nor a variable of the expression."""
-    if any(name not in own and name not in parameters for name in expression.names):  # of thousands of parameters
-        expression.check({*parameters, *own})
+    if any(name not in variables and name not in parameters for name in expression.names):  # of thousands of parameters
+        expression.check({*parameters, *variables})
 
 
 def _traceable(motion: AbstractMotion) -> AbstractMotion:
@@ -152,12 +152,12 @@ def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -
     if isinstance(law, str):
         law = expression_in_si(law)
     if isinstance(law, Expression):
-        own = {"t", *names[0], *names[1]}
-        _check_names(law, own, parameters)
-        for name in sorted({name for name in law.names & own if name in parameters}):
+        variables = {"t", *names[0], *names[1]}
+        _check_names(law, variables, parameters)
+        for name in sorted({name for name in law.names & variables if name in parameters}):
             message = f"the parameter '{name}' has the name of a variable of this law; give it another name"
             raise MechanismError(message, value=law.text)
-        return ExpressionLaw(law, {name: parameters[name] for name in sorted(law.names - own)}, *names)
+        return ExpressionLaw(law, {name: parameters[name] for name in sorted(law.names - variables)}, *names)
     if callable(law):
         return FunctionLaw(law)
     raise MechanismError("a law is a number, an expression, a motion law or a function of jets", value=law)
@@ -274,8 +274,8 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
 
 def _of_part(element: Element, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
     """Return the values of an element within another element, which holds the bodies."""
-    rest = {field.name: field.default for field in dataclasses.fields(type(element)) if not field.init}
-    return {"bodies": ()} | rest | resolve_element(element, parameters, components, name)
+    defaults = {field.name: field.default for field in dataclasses.fields(type(element)) if not field.init}
+    return {"bodies": ()} | defaults | resolve_element(element, parameters, components, name)
 
 
 def _points(value: Any, count: int, components: int) -> Any:
@@ -311,8 +311,8 @@ def _check_directions(values: Mapping[str, Any], never_parallel: Iterable[tuple[
         vector, axis = values[field], values[other]
         if isinstance(axis, np.ndarray) and isinstance(vector, np.ndarray):
             (a, b, c), (x, y, z) = _of_size_one(axis), _of_size_one(vector)
-            across = math.hypot(b * z - c * y, c * x - a * z, a * y - b * x)
-            if across < 1e-9 * math.hypot(a, b, c) * math.hypot(x, y, z):
+            cross_size = math.hypot(b * z - c * y, c * x - a * z, a * y - b * x)
+            if cross_size < 1e-9 * math.hypot(a, b, c) * math.hypot(x, y, z):
                 message = f"must not be parallel to the {stem_of(other)}"
                 raise MechanismError(message, name=f"{name}.{field}", value=_plain(vector))
 
@@ -337,13 +337,13 @@ def static_fields(kind: type[Element]) -> tuple[str, ...]:
 def group_key(element: Element, values: Mapping[str, Any]) -> Any:
     """Return what instances must share to be stacked: class, static fields, and the structure of their values."""
     static = static_fields(type(element))
-    words = (len(element.bodies), *(getattr(element, name) for name in static))
+    static_values = (len(element.bodies), *(getattr(element, name) for name in static))
     numbers_only = {name: value for name, value in values.items() if name not in static}
     if all(type(value) in _NUMBERS or isinstance(value, jax.Array) for value in numbers_only.values()):  # traced, too
         shapes = tuple((name, np.shape(value)) for name, value in numbers_only.items())
-        return type(element), words, shapes  # defines the structure without flattening
+        return type(element), static_values, shapes  # defines the structure without flattening
     leaves, structure = jax.tree.flatten(numbers_only)
-    return type(element), words, structure, tuple(np.shape(leaf) for leaf in leaves)
+    return type(element), static_values, structure, tuple(np.shape(leaf) for leaf in leaves)
 
 
 def stack_elements(elements: Sequence[Element], values: Sequence[Mapping[str, Any]]) -> Any:

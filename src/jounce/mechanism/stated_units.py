@@ -20,7 +20,7 @@ _Use = tuple[str, Any, str, dict[str, Dimension | None]]
 
 def check_stated_units(mechanism: Any, dimensions: Mapping[str, Dimension]) -> None:
     """Raise UnitError if parameters are used where values of other dimensions are expected, as in a file."""
-    for where, value, expected, variables in _uses(mechanism):
+    for location, value, expected, variables in _uses(mechanism):
         if isinstance(value, list | tuple | np.ndarray):
             entries = np.ravel(np.asarray(value, dtype=object)).tolist()
         else:
@@ -32,7 +32,7 @@ def check_stated_units(mechanism: Any, dimensions: Mapping[str, Dimension]) -> N
             try:
                 parse_value(text, expected, mechanism.parameters, dimensions, variables)
             except JounceError as error:
-                raise error.located(name=where, value=text) from None
+                raise error.located(name=location, value=text) from None
 
 
 def _uses(mechanism: Any) -> Iterator[_Use]:
@@ -45,11 +45,11 @@ def _uses(mechanism: Any) -> Iterator[_Use]:
             yield from _uses_of(element, f"{kind}.{name}")
 
 
-def _uses_of(element: Module, where: str, clock: Dimension | None = TIME) -> Iterator[_Use]:
+def _uses_of(element: Module, location: str, clock: Dimension | None = TIME) -> Iterator[_Use]:
     """Yield the values of an element; `clock` is the dimension of the variable of motion laws, None if unknown."""
     kinds, dimensions = field_kinds(type(element)), facts_of(type(element)).dimensions
     for field in value_fields(type(element)):
-        kind, value, place = kinds[field], getattr(element, field), f"{where}.{field}"
+        kind, value, place = kinds[field], getattr(element, field), f"{location}.{field}"
         expected = at_coordinate(dimensions[field], getattr(element, "coordinate", None))
         if kind in ("part", "nested") and value is not None:
             yield from _uses_of(value, place, None)  # the law of a cam depends on a coordinate

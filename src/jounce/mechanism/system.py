@@ -125,15 +125,15 @@ def _derivative_blocks(
     element: Any, poses: Sequence[Pose], time: Jet, scale: Float[Numbers, " coordinate"], slots: tuple[int, ...]
 ) -> list[Any]:
     batch, shifts = poses[0].position.shape[-2:], poses[0].shifts
-    still = [p.extended(None, None) for p in poses]
+    static = [p.extended(None, None) for p in poses]
     directions = jnp.diag(scale)[:, :, None, None]
     blocks = []
     for slot in slots:
 
         def slope(shift: Any, turn: Any, slot: int = slot) -> Any:
-            changed = list(still)
-            changed[slot] = poses[slot].extended(shift, turn)
-            value, rate = with_rows(element.residual(*changed, time)).coefficients
+            displaced = list(static)
+            displaced[slot] = poses[slot].extended(shift, turn)
+            value, rate = with_rows(element.residual(*displaced, time)).coefficients
             return jnp.zeros_like(value) if rate is None else rate
 
         def wide(direction: Any) -> Any:
@@ -189,12 +189,12 @@ def group_elements(
 ) -> tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]:
     """Return the groups of all elements, and the names of the instances in each."""
     members_by_key: dict[Any, list[tuple[str, Any, dict]]] = {}
-    written = {kind for kind in set(map(type, elements.values())) if has_own_methods(kind)}
+    user_classes = {kind for kind in set(map(type, elements.values())) if has_own_methods(kind)}
     for name, element in elements.items():
         values = resolve_element(element, parameters, components, name)
         try:
             check_no_own_code(element)
-            readings = readings_of(element, values, components) if type(element) in written else {}
+            readings = readings_of(element, values, components) if type(element) in user_classes else {}
         except JounceError as error:
             raise error.located(name=name) from error.__cause__
         if readings:
@@ -203,8 +203,8 @@ def group_elements(
     groups, names = [], []
     for members in members_by_key.values():
         instance_names, instances, values = zip(*members, strict=True)
-        named = zip(instance_names, instances, strict=True)
-        slots = zip(*([body_index[b] for b in (*e.bodies, *carriages(n, e))] for n, e in named), strict=True)
+        pairs = zip(instance_names, instances, strict=True)
+        slots = zip(*([body_index[b] for b in (*e.bodies, *carriages(n, e))] for n, e in pairs), strict=True)
         groups.append(unchecked(Group, {"element": _stacked(instances, values), "bodies": tuple(slots)}))
         names.append(instance_names)
     return tuple(groups), tuple(names)
@@ -249,10 +249,10 @@ class System(Module):
     @property
     def elimination_order(self) -> Order:
         """Order of rows and columns in which reflections eliminate the Jacobian with little fill-in."""
-        touched = []
+        row_bodies = []
         for group, count in zip(self.groups, self.pattern.row_counts, strict=True):
-            touched += [frozenset(b - 1 for b in bodies if b) for bodies in zip(*group.bodies, strict=True)] * count
-        return elimination_order(tuple(touched), self.body_count, self.pattern.width)
+            row_bodies += [frozenset(b - 1 for b in bodies if b) for bodies in zip(*group.bodies, strict=True)] * count
+        return elimination_order(tuple(row_bodies), self.body_count, self.pattern.width)
 
     def residual(self, pose: Pose, time: Jet) -> Float[Jet, "row batch"]:
         """Return the scaled residuals of all constraints, shape (rows, batch)."""
@@ -308,10 +308,10 @@ class System(Module):
         if not self.forces:
             return Jet.constant(jnp.zeros((pose.shifts + pose.turns, *pose.position.shape[1:])), order)
         sizes = jax.lax.optimization_barrier([stacked(group.force(pose, time)) for group in self.forces])
-        now = time.truncate(order)
+        truncated = time.truncate(order)
 
-        def along(still: Any, change: Any) -> list[Any]:
-            return [stacked(group.variation(still, change, now)) for group in self.forces]
+        def along(static: Any, change: Any) -> list[Any]:
+            return [stacked(group.variation(static, change, truncated)) for group in self.forces]
 
         return conjugate_series(along, pose.truncate(order), sizes)
 
@@ -322,7 +322,7 @@ class System(Module):
         """
         if not self.groups:
             return Jet.constant(jnp.zeros((pose.shifts + pose.turns, *pose.position.shape[1:])), pose.order)
-        return conjugate_series(lambda still, change: stacked(self.variation(still, change, time)), pose, multipliers)
+        return conjugate_series(lambda static, change: stacked(self.variation(static, change, time)), pose, multipliers)
 
     def finite_forces(self, pose: Pose, time: Jet) -> Bool[Numbers, "force batch"]:
         """Return whether each applied force is finite, shape (forces, batch); the pose contains velocities.
@@ -330,8 +330,8 @@ class System(Module):
         A force has no direction where its velocity is not finite, as for the distance of two coincident points.
         """
         lanes = time.coefficients[0].shape[-1]
-        moving = [group.finite(movable(pose.truncate(1)), time.truncate(1)) for group in self.forces]
-        parts = [jnp.broadcast_to(x, (x.shape[0], lanes)) for x in moving]
+        checks = [group.finite(movable(pose.truncate(1)), time.truncate(1)) for group in self.forces]
+        parts = [jnp.broadcast_to(x, (x.shape[0], lanes)) for x in checks]
         return jnp.concatenate([*parts, jnp.ones((0, lanes), bool)])
 
     def coordinates(
@@ -344,12 +344,12 @@ class System(Module):
         return parts[:shifts], parts[shifts:]
 
 
-def conjugate_series(along: Callable[[Any, Any], Any], pose: Pose, sizes: Any) -> Jet:
+def conjugate_series(variation: Callable[[Any, Any], Any], pose: Pose, sizes: Any) -> Jet:
     """Return the forces on all bodies that are conjugate to given displacements, (coordinates, bodies, batch).
 
     Parameters
     ----------
-    along : callable
+    variation : callable
         Returns the variation of the displacements for a pose and its change: linear in the change, in the structure of
         `sizes`.
     pose : SpatialPose or PlanarPose
@@ -357,11 +357,11 @@ def conjugate_series(along: Callable[[Any, Any], Any], pose: Pose, sizes: Any) -
     sizes : pytree of array
         Taylor coefficients of the force components.
     """
-    still, order = movable(pose), pose.order
+    static, order = movable(pose), pose.order
 
     def varied(velocity: Any) -> Any:
         shift, turn = (Jet(tuple(part)) for part in (velocity[:, : pose.shifts], velocity[:, pose.shifts :]))
-        return along(still, movable(still.varied(shift, turn).truncate(order)))
+        return variation(static, movable(static.varied(shift, turn).truncate(order)))
 
     shape = (order + 1, pose.shifts + pose.turns, *pose.position.shape[1:])
     transposed = jax.linear_transpose(varied, jax.ShapeDtypeStruct(shape, jnp.float64))
@@ -374,8 +374,8 @@ def movable(pose: Pose) -> Any:
     """Return a pose without structural zeros, ready for a variation."""
     pose = each_jet(Jet.dense, pose)
     if isinstance(pose, SpatialPose) and pose.order and pose.angular_velocity is None:
-        rest = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), pose.order - 1).dense()
-        return dataclasses.replace(pose, angular_velocity=rest)
+        zero = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), pose.order - 1).dense()
+        return dataclasses.replace(pose, angular_velocity=zero)
     return pose
 
 

@@ -49,10 +49,10 @@ class TimeGrid:
     count: Any = None
 
     def __post_init__(self) -> None:
-        plain = all(isinstance(x, int | float) for x in (self.start, self.stop))
-        if plain and type(self.step) is int and self.step >= FEW and 0 < self.stop - self.start < self.step:
-            words = f"the third value of a TimeGrid is its step, s, and {self.step} s is longer than the grid"
-            warn_caller(UnitWarning(f"{words}: it has two instants; count={self.step} gives so many"))
+        are_numbers = all(isinstance(x, int | float) for x in (self.start, self.stop))
+        if are_numbers and type(self.step) is int and self.step >= FEW and 0 < self.stop - self.start < self.step:
+            phrase = f"the third value of a TimeGrid is its step, s, and {self.step} s is longer than the grid"
+            warn_caller(UnitWarning(f"{phrase}: it has two instants; count={self.step} gives so many"))
 
 
 TimeLike = TypeAliasType("TimeLike", ArrayLike | TimeGrid)
@@ -81,12 +81,12 @@ class SpacedInstants:
     def __len__(self) -> int:
         return self.count
 
-    def __getitem__(self, which: Any) -> Any:
+    def __getitem__(self, index: Any) -> Any:
         """Return instants by index or slice, like an array."""
-        chosen = range(self.count)[which]
-        if isinstance(chosen, int):
-            return self._at(np.array([chosen]))[0]
-        return self._at(np.arange(chosen.start, chosen.stop, chosen.step))
+        indices = range(self.count)[index]
+        if isinstance(indices, int):
+            return self._at(np.array([indices]))[0]
+        return self._at(np.arange(indices.start, indices.stop, indices.step))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return self._at(np.arange(self.count)).astype(dtype or float, copy=False)
@@ -159,8 +159,8 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> SpacedInstants:
     else:
         steps = (stop - start) / values["step"]
         part = PART_OF_STEP + 2 * np.spacing(max(abs(start), abs(stop))) / values["step"]  # rounding of late instants
-        whole = np.floor(steps + part)
-        count = whole + 1 + (steps > whole + part)  # the last step is shorter
+        full_steps = np.floor(steps + part)
+        count = full_steps + 1 + (steps > full_steps + part)  # the last step is shorter
     if count > MAX_INSTANTS:
         raise MechanismError(f"a time grid holds at most {MAX_INSTANTS} instants", name="time", value=float(count))
     step = values["step"] if "step" in values else (stop - start) / max(int(count) - 1, 1)
@@ -179,8 +179,8 @@ def last_step_words(instants: Instants) -> str:
         return ""
     steps = np.diff(instants)
     step, last = float(steps[0]), float(steps[-1])
-    alike = np.abs(steps[:-1] - step).max() <= PART_OF_STEP * step
-    if not (alike and last < step * (1 - 2 * PART_OF_STEP)):
+    are_equal = np.abs(steps[:-1] - step).max() <= PART_OF_STEP * step
+    if not (are_equal and last < step * (1 - 2 * PART_OF_STEP)):
         return ""
     return f"the step of {step:.6g} s does not divide the time: the last one is {last:.6g} s"
 
@@ -196,15 +196,15 @@ def nearest_instants(
     [0, 1, 1]
     """
     order = np.argsort(known, kind="stable")
-    rising = known[order]
+    ordered = known[order]
     if len(known) < len(instants) and np.all(instants[:-1] <= instants[1:]):
-        ends = np.searchsorted(instants, rising[:-1] + 0.5 * (rising[1:] - rising[:-1]), side="right")
+        ends = np.searchsorted(instants, ordered[:-1] + 0.5 * (ordered[1:] - ordered[:-1]), side="right")
         counts = np.append(ends, len(instants))
         counts[1:] -= ends
         return np.repeat(order, counts)
-    after = np.clip(np.searchsorted(rising, instants), 1, max(len(known) - 1, 1))
+    after = np.clip(np.searchsorted(ordered, instants), 1, max(len(known) - 1, 1))
     before, after = after - 1, np.minimum(after, len(known) - 1)
-    return order[np.where(instants - rising[before] <= rising[after] - instants, before, after)]
+    return order[np.where(instants - ordered[before] <= ordered[after] - instants, before, after)]
 
 
 def first_instant(time: TimeLike | None, parameters: Mapping[str, Any]) -> float:

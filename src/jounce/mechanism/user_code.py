@@ -133,35 +133,35 @@ def _methods_of(kind: type) -> tuple[str, ...]:
 
 def _class_description(kind: type) -> tuple[str, ...]:
     """Return the facts that a class states beside its methods."""
-    ours = [base for base in kind.__mro__ if belongs_to_package(base)]
-    named = {name for base in ours for name, value in vars(base).items() if name[0] != "_" and not callable(value)}
+    bases = [base for base in kind.__mro__ if belongs_to_package(base)]
+    names = {name for base in bases for name, value in vars(base).items() if name[0] != "_" and not callable(value)}
     fields = {field.name for field in dataclasses.fields(kind)}
-    return tuple(f"{name}={getattr(kind, name, None)!r}" for name in sorted(named - fields))
+    return tuple(f"{name}={getattr(kind, name, None)!r}" for name in sorted(names - fields))
 
 
 def _class_for(kind: type) -> type:
     """Return the derived class of a user's class whose methods run programs."""
     if kind not in _classes:
         role = next(role for role in _METHODS if issubclass(kind, role))
-        own: dict[str, Any] = {name: _dispatched(name) for name in _METHODS[role] if hasattr(kind, name)}
-        own |= {
+        namespace: dict[str, Any] = {name: _dispatched(name) for name in _METHODS[role] if hasattr(kind, name)}
+        namespace |= {
             "__module__": kind.__module__,
             "__qualname__": kind.__qualname__,
             "__annotations__": {READINGS: Any},
             READINGS: field(default=None, init=False),
             "stands_for": kind,
         }
-        _classes[kind] = type(kind)(kind.__name__, (kind,), own)
+        _classes[kind] = type(kind)(kind.__name__, (kind,), namespace)
     return _classes[kind]
 
 
 def _dispatched(name: str) -> Callable[..., Any]:
     def method(self: Any, *arguments: Any) -> Any:
-        written = getattr(users_class(type(self)), name)
+        user_method = getattr(users_class(type(self)), name)
         reading = vars(self)[READINGS].get(name)
         if reading is None:
-            return written(self, *arguments)
-        return reading(lambda: written(_plain(self), *arguments), lambda: _inputs(self, arguments))
+            return user_method(self, *arguments)
+        return reading(lambda: user_method(_plain(self), *arguments), lambda: _inputs(self, arguments))
 
     method.__name__ = name
     return method
@@ -287,30 +287,30 @@ class _Reader:
             raise MechanismError(message)
 
     def reading(self, name: str) -> Reading:
-        written, arguments = getattr(self.kind, name), self._arguments(name)
+        user_method, arguments = getattr(self.kind, name), self._arguments(name)
         of_time = [name for name in self.laws if isinstance(arguments[-1], Jet)]
         law_series = {law: _series((), ORDER) for law in of_time}
         fields = _fields_with_numbers(self.kind, self.laws)
-        held, tree = jax.tree.flatten([getattr(self.element, n) for n in fields])
-        jets = [*(x for argument in arguments for x in _jets(argument)), *law_series.values(), *held]
+        leaves, tree = jax.tree.flatten([getattr(self.element, n) for n in fields])
+        jets = [*(x for argument in arguments for x in _jets(argument)), *law_series.values(), *leaves]
         rates = [a.angular_velocity for a in arguments if isinstance(a, SpatialPose)]
 
         def called(given: Sequence[Any], rates: Iterator[Any]) -> Any:
-            parts = iter(given[: len(given) - len(held)])
+            parts = iter(given[: len(given) - len(leaves)])
             poses = [_rebuilt(argument, parts, rates) for argument in arguments]
             laws = {law: _Prescribed(poses[-1], next(parts)) for law in of_time}
-            own = jax.tree.unflatten(tree, given[len(given) - len(held) :])
-            return written(with_fields(self.element, **dict(zip(fields, own, strict=True)), **laws), *poses)
+            numbers = jax.tree.unflatten(tree, given[len(given) - len(leaves) :])
+            return user_method(with_fields(self.element, **dict(zip(fields, numbers, strict=True)), **laws), *poses)
 
         def on_values(*values: Any) -> Any:
             if not self.settled:
                 raise ValueError("fields that are found later")
-            moving, own = values[: len(values) - len(held)], values[len(values) - len(held) :]
-            outcome = called([*(Jet([x]) for x in moving), *own], itertools.repeat(None))
+            jet_values, numbers = values[: len(values) - len(leaves)], values[len(values) - len(leaves) :]
+            outcome = called([*(Jet([x]) for x in jet_values), *numbers], itertools.repeat(None))
             return outcome.coefficients[0] if isinstance(outcome, Jet) else outcome
 
         def whole() -> Any:
-            return written(self.element, *jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), arguments))
+            return user_method(self.element, *jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), arguments))
 
         return read_method(on_values, lambda given, rates: called(given, iter(rates)), jets, rates, whole)
 
@@ -353,8 +353,8 @@ def _example(components: int) -> Pose:
 def _rebuilt(argument: Any, jets: Iterator[Jet], rates: Iterator[Any]) -> Any:
     """Return an argument with its jets replaced."""
     if isinstance(argument, SpatialPose):
-        position, quaternion, *rest = (next(jets) for _ in range(8))
-        return SpatialPose(position, quaternion, tuple(rest[:3]), tuple(rest[3:]), next(rates))
+        position, quaternion, *parts = (next(jets) for _ in range(8))
+        return SpatialPose(position, quaternion, tuple(parts[:3]), tuple(parts[3:]), next(rates))
     if isinstance(argument, PlanarPose):
         return PlanarPose(*(next(jets) for _ in range(4)))
     if not isinstance(argument, Jet):

@@ -128,8 +128,8 @@ def captured_function(function: Callable[..., Any], *examples: Any) -> CapturedF
         program = _known.get(key)
     if program is None:
         given = [_shaped(x) for x in captured], [_shaped(v.aval) for v in closed.jaxpr.invars]
-        whole = jax.make_jaxpr(lambda values, arguments: _Replay(values).of(closed, arguments))(*given)
-        program = Program(*key, tuple(np.shape(x) for x in captured), whole)
+        replayed = jax.make_jaxpr(lambda values, arguments: _Replay(values).of(closed, arguments))(*given)
+        program = Program(*key, tuple(np.shape(x) for x in captured), replayed)
         if dtype := _narrowed(closed.jaxpr):
             digits = int(jnp.finfo(dtype).precision)
             message = f"a function given here computes in {dtype}: results have {digits} digits; convert nothing to it"
@@ -185,8 +185,8 @@ def _may_hold_stale_functions(jaxpr: Jaxpr, within: str = "") -> bool:
         if name in _BY_IDENTITY and within not in _OF_ARRAYS:
             return True
         for inner in _inner(equation):
-            known = _is_of_libraries(inner) and _origin(inner) != _CALLER
-            if not known or _may_hold_stale_functions(inner, str(equation.params.get("name", ""))):
+            is_library = _is_of_libraries(inner) and _origin(inner) != _CALLER
+            if not is_library or _may_hold_stale_functions(inner, str(equation.params.get("name", ""))):
                 return True
     return False
 
@@ -202,8 +202,8 @@ def _narrowed(jaxpr: Jaxpr) -> np.dtype | None:
     """Return the type narrower than double precision to which a program converts numbers, or None."""
     for equation in jaxpr.eqns:
         made: Any = equation.params.get("new_dtype")
-        taken: list[Any] = [v.aval for v in equation.invars]
-        if equation.primitive.name == "convert_element_type" and taken[0].dtype == np.float64:
+        input_avals: list[Any] = [v.aval for v in equation.invars]
+        if equation.primitive.name == "convert_element_type" and input_avals[0].dtype == np.float64:
             made = np.dtype(made)
             if jnp.issubdtype(made, jnp.floating) and made != np.float64:
                 return made
@@ -262,8 +262,8 @@ class Pass(abc.ABC):
         return [look(v) for v in jaxpr.outvars]
 
     def _number(self, value: Any, aval: Any, *, exponent: bool = False) -> Any:
-        known = exponent or not jnp.issubdtype(aval.dtype, jnp.inexact)
-        return self.fixed(value, aval.dtype) if known and not isinstance(value, Tracer) else self.captured(
+        is_defined = exponent or not jnp.issubdtype(aval.dtype, jnp.inexact)
+        return self.fixed(value, aval.dtype) if is_defined and not isinstance(value, Tracer) else self.captured(
             value, aval.dtype
         )  # fmt: skip
 
@@ -319,8 +319,8 @@ class _Description(Pass):
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
         names = [f"%{next(self._results)}" for _ in equation.outvars]
-        made: list[Any] = [v.aval for v in equation.outvars]
-        kinds = [f"{aval.shape} {aval.dtype}" for aval in made]
+        avals: list[Any] = [v.aval for v in equation.outvars]
+        kinds = [f"{aval.shape} {aval.dtype}" for aval in avals]
         self._lines.append(f"{names} {kinds} = {equation.primitive.name} {self.parameters(equation)} {operands}")
         return names
 

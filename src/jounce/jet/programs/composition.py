@@ -144,25 +144,25 @@ def over_instances(
     x : Jet
         Argument with batch axes.
     """
-    several = [np.ndim(value) > len(shape) for value, shape in zip(captured, shapes, strict=True)]
-    if not any(several):
+    stacked = [np.ndim(value) > len(shape) for value, shape in zip(captured, shapes, strict=True)]
+    if not any(stacked):
         flat = x.map(lambda c: jnp.reshape(jnp.asarray(c, float), -1))
         return jax.vmap(lambda x: function(captured, x))(flat).map(lambda c: jnp.reshape(c, x.shape))
-    axes = tuple(-1 if is_many and np.shape(v)[-1] > 1 else None for v, is_many in zip(captured, several, strict=True))
+    axes = tuple(-1 if is_many and np.shape(v)[-1] > 1 else None for v, is_many in zip(captured, stacked, strict=True))
 
     def of_instance(captured: Any, x: Jet) -> Jet:
         given = tuple(
-            v[..., 0] if is_many and a is None else v for v, is_many, a in zip(captured, several, axes, strict=True)
+            v[..., 0] if is_many and a is None else v for v, is_many, a in zip(captured, stacked, axes, strict=True)
         )
         return jax.vmap(function, in_axes=(axes, -1), out_axes=-1)(given, x)
 
-    each = tuple(-2 if is_many else None for is_many in several)
-    wide = x.map(lambda c: jnp.broadcast_to(c, jnp.broadcast_shapes(x.shape, *_ends(captured, several))))
-    return jax.vmap(of_instance, in_axes=(each, -2), out_axes=-2)(tuple(captured), wide)
+    each = tuple(-2 if is_many else None for is_many in stacked)
+    broadcast = x.map(lambda c: jnp.broadcast_to(c, jnp.broadcast_shapes(x.shape, *_ends(captured, stacked))))
+    return jax.vmap(of_instance, in_axes=(each, -2), out_axes=-2)(tuple(captured), broadcast)
 
 
-def _ends(captured: Sequence[Any], several: Sequence[bool]) -> list[tuple[int, ...]]:
-    return [np.shape(v)[-2:] for v, is_many in zip(captured, several, strict=True) if is_many]
+def _ends(captured: Sequence[Any], stacked: Sequence[bool]) -> list[tuple[int, ...]]:
+    return [np.shape(v)[-2:] for v, is_many in zip(captured, stacked, strict=True) if is_many]
 
 
 def on_jets(program: Program, captured: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:
@@ -239,14 +239,14 @@ def _value(x: Any) -> Any:
     return x.coefficients[0] if isinstance(x, Jet) else x
 
 
-def _select(which: Any, *cases: Any, **_) -> Any:
+def _select(choice: Any, *cases: Any, **_) -> Any:
     jets = [x for x in cases if isinstance(x, Jet)]
     if not jets:
-        return jax.lax.select_n(_value(which), *cases)
+        return jax.lax.select_n(_value(choice), *cases)
     order = min(x.order for x in jets)
-    whole = [x if isinstance(x, Jet) else Jet.constant(x, order) for x in cases]
-    columns = zip(*(x.dense().coefficients for x in whole), strict=False)
-    return Jet(jax.lax.select_n(_value(which), *column) for column in columns)
+    series = [x if isinstance(x, Jet) else Jet.constant(x, order) for x in cases]
+    columns = zip(*(x.dense().coefficients for x in series), strict=False)
+    return Jet(jax.lax.select_n(_value(choice), *column) for column in columns)
 
 
 def _without_parameters(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -269,7 +269,7 @@ _WITHOUT_RATES = STEPWISE | frozenset("and eq ge gt iota is_finite le lt ne not 
 
 
 def _has_rule(name: str) -> bool:
-    return any(name in known for known in (_RULES, COMPOSED, REARRANGING, _BILINEAR, _WITHOUT_RATES))
+    return any(name in table for table in (_RULES, COMPOSED, REARRANGING, _BILINEAR, _WITHOUT_RATES))
 
 
 def _operations(jaxpr: Any) -> Any:

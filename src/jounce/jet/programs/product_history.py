@@ -100,9 +100,9 @@ class ProductHistory:
         else:
             products = jax.lax.fori_loop(0, count, block, jnp.zeros(self._width))
         sums, place = [], 0
-        for (which, _, weighted), runs in zip(self._pairs, self._runs, strict=True):
+        for (kind, _, weighted), runs in zip(self._pairs, self._runs, strict=True):
             part, place = runs.spread(products[place : place + runs.count]), place + runs.count
-            part = part.reshape(self._shapes[which])
+            part = part.reshape(self._shapes[kind])
             sums.append(part / k if weighted else part)
         return sums
 

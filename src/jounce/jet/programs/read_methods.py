@@ -114,10 +114,10 @@ class ReadObject(Module):
     def of(cls, source: Any, orders: Sequence[int], shape: tuple[int, ...] = ()) -> "ReadObject":
         """Return the current reading of an object for jets of given orders and shape."""
         leaves, tree = jax.tree.flatten(source)
-        held = [np.shape(x) for x in leaves]
+        shapes = [np.shape(x) for x in leaves]
         jets = [Jet([jax.ShapeDtypeStruct((*shape, 1, 1), float)] * (order + 1)) for order in orders]
         jets[-1] = Jet([jax.ShapeDtypeStruct((1, 1), float)] * (orders[-1] + 1))  # time
-        fields = [jax.ShapeDtypeStruct((*field_shape, 1, 1), float) for field_shape in held]
+        fields = [jax.ShapeDtypeStruct((*field_shape, 1, 1), float) for field_shape in shapes]
 
         def on_jets(given: Sequence[Any], _: Any) -> Any:
             return jax.tree.unflatten(tree, given[len(jets) :])(*given[: len(jets)])
@@ -128,7 +128,7 @@ class ReadObject(Module):
             return value
 
         reading = read_method(on_values, on_jets, [*jets, *fields], [])
-        return cls(reading, tuple(leaves), tuple(held), Untraced(source))
+        return cls(reading, tuple(leaves), tuple(shapes), Untraced(source))
 
     def __call__(self, *jets: Jet) -> Jet:
         """Return the jet of the object; the last axes of all jets are instances and batch."""

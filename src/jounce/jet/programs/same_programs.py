@@ -41,11 +41,11 @@ class _Nodes(Pass):
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
         given: list[Any] = [v.aval for v in equation.invars]
-        made: list[Any] = [v.aval for v in equation.outvars]
-        name, shapes = equation.primitive.name, [(aval.shape, str(aval.dtype)) for aval in made]
+        avals: list[Any] = [v.aval for v in equation.outvars]
+        name, shapes = equation.primitive.name, [(aval.shape, str(aval.dtype)) for aval in avals]
         if name in _SPREADING:
             operands = [self._without_broadcast(x) for x in operands]
-        if name == "reshape" and given[0].shape == made[0].shape:
+        if name == "reshape" and given[0].shape == avals[0].shape:
             return operands
         parameters, nameless = parameters_of(equation)
         key = name, tuple(parameters), tuple(map(id, nameless)), tuple(operands), tuple(shapes)

@@ -144,8 +144,8 @@ class Recursion(ProgramReader):
             Coefficients of order k of the arguments; None is zero.
         """
         if self._still is not None:
-            known = zip(self._still.given, coefficients, strict=True)
-            coefficients = [c if c is None else jnp.where(still, 0.0, c) for still, c in known]
+            pairs = zip(self._still.given, coefficients, strict=True)
+            coefficients = [c if c is None else jnp.where(still, 0.0, c) for still, c in pairs]
         return self.swept(coefficients, self._rows.sums(history, k))
 
     def swept(self, coefficients: Sequence[Any], sums: Sequence[Any]) -> tuple[Any, tuple[Any, ...]]:
@@ -158,10 +158,10 @@ class Recursion(ProgramReader):
         sums : sequence of array
             Sums of the products of known coefficients, in the order of `form`.
         """
-        now = self._swept(coefficients, dict(zip(self._products, sums, strict=True)))
+        values = self._swept(coefficients, dict(zip(self._products, sums, strict=True)))
 
         def value_of(x: Any) -> Any:
-            c = now[x] if isinstance(x, int) else None
+            c = values[x] if isinstance(x, int) else None
             return jnp.zeros_like(self.value(x)) if c is None else c
 
         return self._collected([value_of(x) for x in self._outputs]), tuple(map(value_of, self._stored))
@@ -177,13 +177,13 @@ class Recursion(ProgramReader):
 
     def _swept(self, coefficients: Sequence[Any], sums: dict[_Pair, Any] | None) -> dict[int, Any]:
         """Return the coefficients of order k of all variables, from those of the arguments; None is zero."""
-        now: dict[int, Any] = dict(zip(self._inputs, coefficients, strict=True))
+        values: dict[int, Any] = dict(zip(self._inputs, coefficients, strict=True))
         for node in self._nodes:
-            parts = [now[x] if isinstance(x, int) else None for x in node.operands]
+            parts = [values[x] if isinstance(x, int) else None for x in node.operands]
             swept = None if sums is None or not node.pairs else total(sums[pair] for pair in node.pairs)
             with by_certain_entries() if node.sparse else nullcontext():
-                now[node.result] = node.rule(parts, swept)
-        return now
+                values[node.result] = node.rule(parts, swept)
+        return values
 
     # variables
 
@@ -198,22 +198,22 @@ class Recursion(ProgramReader):
     def _needed(self) -> list[_Node]:
         """Return the nodes on which the outputs depend."""
         makers = {node.result: node for node in self._nodes}
-        needed: set[int] = set()
-        waiting = [x for x in self._outputs if isinstance(x, int)]
-        while waiting:
-            number = waiting.pop()
-            if number in makers and number not in needed:
-                needed.add(number)
+        used: set[int] = set()
+        pending = [x for x in self._outputs if isinstance(x, int)]
+        while pending:
+            number = pending.pop()
+            if number in makers and number not in used:
+                used.add(number)
                 node = makers[number]
-                waiting += [x for x in node.operands if isinstance(x, int)]
-                waiting += [x for pair in node.pairs for x in pair[:2]]
-        return [node for node in self._nodes if node.result in needed]
+                pending += [x for x in node.operands if isinstance(x, int)]
+                pending += [x for pair in node.pairs for x in pair[:2]]
+        return [node for node in self._nodes if node.result in used]
 
     # interpretation of the program
 
     def results(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
         """Return the results of one operation; repeated operations are interpreted once."""
-        around, self._sparse = self._sparse, self._sparse or is_by_certain_entries(equation)
+        outer, self._sparse = self._sparse, self._sparse or is_by_certain_entries(equation)
         try:
             with by_certain_entries() if self._sparse else nullcontext():
                 key = self._key(equation, operands)
@@ -223,7 +223,7 @@ class Recursion(ProgramReader):
                     self._known[key] = self._read(equation, operands), operands
                 return self._known[key][0]
         finally:
-            self._sparse = around
+            self._sparse = outer
 
     def _read(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
         """Return the results of one operation; a loop that only adds is run unchanged at every order."""
@@ -233,10 +233,10 @@ class Recursion(ProgramReader):
             return super().results(equation, operands)
         bind = partial(equation.primitive.bind, **equation.params)
 
-        def of(which: int) -> Callable[..., Any]:
+        def of(index: int) -> Callable[..., Any]:
             def rule(parts: list[Any], _: Any) -> Any:
                 results = self._passed(bind, operands, parts, additive=True)
-                return None if results is None else results[which]
+                return None if results is None else results[index]
 
             return rule
 
@@ -246,12 +246,12 @@ class Recursion(ProgramReader):
         """Return a linear operation on next coefficients; constants are zero if they are added, else unchanged."""
         if all(part is None for part in parts):
             return None
-        whole = []
+        values = []
         for x, part in zip(operands, parts, strict=True):
             fixed = self.value(x)
             adds = isinstance(x, int) or (additive and jnp.issubdtype(jnp.result_type(fixed), jnp.floating))
-            whole.append(part if part is not None else jnp.zeros_like(fixed) if adds else fixed)
-        return bind(*whole)
+            values.append(part if part is not None else jnp.zeros_like(fixed) if adds else fixed)
+        return bind(*values)
 
     def _key(self, equation: JaxprEqn, operands: list[Any]) -> Any:
         """Return a key of an operation, or None if its parameters cannot be hashed."""
@@ -275,8 +275,8 @@ class Recursion(ProgramReader):
 
     def is_constant(self, equation: JaxprEqn, operands: list[Any]) -> bool:
         """Return whether the results are constant; selections are constant within a step."""
-        made: Any = [variable.aval for variable in equation.outvars]
-        floating = any(jnp.issubdtype(aval.dtype, jnp.floating) for aval in made)
+        avals: Any = [variable.aval for variable in equation.outvars]
+        floating = any(jnp.issubdtype(aval.dtype, jnp.floating) for aval in avals)
         return not floating or super().is_constant(equation, operands)
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
@@ -285,8 +285,8 @@ class Recursion(ProgramReader):
         if name == "optimization_barrier":
             return operands
         if name in BROADCASTING:  # JAX broadcasts scalars and axes of length one
-            made: Any = equation.outvars[0].aval
-            operands = [self._widened(x, made.shape) for x in operands]
+            aval: Any = equation.outvars[0].aval
+            operands = [self._widened(x, aval.shape) for x in operands]
         if name in STEPWISE:
             return [_Constant(primitive.bind(*map(self.value, operands), **parameters))]
         if name in COMPOSED:
@@ -345,12 +345,12 @@ class Recursion(ProgramReader):
         return self._node(rule, first * second, [a, b], [_Pair(a, b, False)])
 
     def _quotient(self, a: Any, b: int) -> int:
-        below, value = self.value(b), self.value(a) / self.value(b)
+        divisor, value = self.value(b), self.value(a) / self.value(b)
         result = len(self._values)  # number of the node made below
 
         def rule(parts: list[Any], sums: Any) -> Any:
-            above = minus(minus(parts[0], sums), times(value, parts[1]))
-            return None if above is None else above / below
+            remainder = minus(minus(parts[0], sums), times(value, parts[1]))
+            return None if remainder is None else remainder / divisor
 
         return self._node(rule, value, [a, b], [_Pair(result, b, False)])
 

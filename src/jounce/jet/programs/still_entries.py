@@ -82,8 +82,8 @@ def still_entries(
         given, factors = new, remaining
 
 
-def _no_change(results: Sequence[np.ndarray], rate: int, like: np.ndarray) -> np.ndarray:
-    return np.zeros(np.shape(like), bool) if rate < 0 else results[rate] == 0
+def _no_change(results: Sequence[np.ndarray], rate: int, pattern: np.ndarray) -> np.ndarray:
+    return np.zeros(np.shape(pattern), bool) if rate < 0 else results[rate] == 0
 
 
 def _unknown_but(still: np.ndarray) -> np.ndarray:

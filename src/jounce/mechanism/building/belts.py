@@ -55,14 +55,14 @@ def belt_course(first: Points, second: Points, radii: Sequence[float], crossed: 
     0.0
     """
     x, y = second - first
-    distance, (one, two) = np.hypot(x, y), radii
-    radial = one + two if crossed else one - two
+    distance, (a, b) = np.hypot(x, y), radii
+    radial = a + b if crossed else a - b
     with np.errstate(invalid="ignore", divide="ignore"):
-        strand = np.sqrt(np.where(distance > one + two, distance**2 - radial**2, np.nan))
+        strand = np.sqrt(np.where(distance > a + b, distance**2 - radial**2, np.nan))
         leaving = np.arccos(radial / distance)
     on_first = 2 * (np.pi - leaving)
     on_second = on_first if crossed else 2 * leaving
-    length = 2 * strand + one * on_first + two * on_second
+    length = 2 * strand + a * on_first + b * on_second
     return BeltCourse(np.arctan2(y, x), leaving, (on_first, on_second), length)
 
 
@@ -71,11 +71,11 @@ def belt_outline(course: BeltCourse, centers: Sequence[Points], radii: Sequence[
 
     The first half of the points is on the second pulley, the other half on the first.
     """
-    share = np.linspace(-1.0, 1.0, 33)
+    fraction = np.linspace(-1.0, 1.0, 33)
     side = -1.0 if crossed else 1.0  # side of the second pulley at which the strand on the left arrives
     line, leaving = course.line[..., None], course.leaving[..., None]
-    around_second = line - side * (np.pi - leaving if crossed else leaving) * share
-    around_first = line + np.pi - (np.pi - leaving) * share
+    around_second = line - side * (np.pi - leaving if crossed else leaving) * fraction
+    around_first = line + np.pi - (np.pi - leaving) * fraction
     parts = [
         center[:, ..., None] + radius * np.stack([np.cos(angle), np.sin(angle)])
         for center, radius, angle in zip(centers[::-1], radii[::-1], (around_second, around_first), strict=True)
@@ -98,13 +98,13 @@ def _check_belts(group: Any, names: Sequence[str], coordinates: Mapping[str, Any
         for slot, point in zip(group.bodies, (belt.point_i, belt.point_j), strict=False)
     ]
     distance = np.hypot(*(centers[1] - centers[0]))
-    bad = np.argwhere((distance <= np.asarray(belt.radius_i + belt.radius_j)).T)
-    if len(bad):
-        lane, instance = bad[0]
-        least = float(np.asarray(belt.radius_i + belt.radius_j)[instance, 0])
+    overlapping = np.argwhere((distance <= np.asarray(belt.radius_i + belt.radius_j)).T)
+    if len(overlapping):
+        lane, instance = overlapping[0]
+        limit = float(np.asarray(belt.radius_i + belt.radius_j)[instance, 0])
         message = (
             f"at t = {time[lane]:g} s the centers are {distance[instance, lane]:.6g} m apart, and the pulleys overlap "
-            f"below {least:.6g} m, the sum of the radii"
+            f"below {limit:.6g} m, the sum of the radii"
         )
         raise MechanismError(message, name=f"{names[instance]}.radii")
 

@@ -183,19 +183,21 @@ def _built(mechanism: Mechanism, like: Model | None, *, initial: bool) -> Model:
 def _released(model: Model) -> Model:
     system, groups, names = model.system, [], []
     for group, members in named_groups(model):
-        stay = [k for k, name in enumerate(members) if not name.startswith("initial.")]
-        if len(stay) < len(members):  # drivers of the same kind may be among them
-            element = jax.tree.map(lambda values, stay=stay: values[..., stay, :], group.element)
-            group = with_fields(group, element=element, bodies=tuple(tuple(s[k] for k in stay) for s in group.bodies))
-        if stay:
+        indices = [k for k, name in enumerate(members) if not name.startswith("initial.")]
+        if len(indices) < len(members):  # drivers of the same kind may be among them
+            element = jax.tree.map(lambda values, indices=indices: values[..., indices, :], group.element)
+            group = with_fields(
+                group, element=element, bodies=tuple(tuple(s[k] for k in indices) for s in group.bodies)
+            )
+        if indices:
             groups.append(group)
-            names.append(tuple(members[k] for k in stay))
+            names.append(tuple(members[k] for k in indices))
     parts = ((tuple(groups), tuple(names)), ((), ()), ((), ()))
-    own = sum(not name.endswith(ENDING) for name in model.bodies) + 1  # carriages follow the bodies
-    length = _size(tuple(groups), model.guess["position"][:, :own])
-    bare = model_of(model.bodies, parts, model.guess, length, model.history)
-    system = with_fields(bare.system, forces=system.forces, outputs=system.outputs)
-    return dataclasses.replace(bare, system=system, forces=model.forces, outputs=model.outputs)
+    count = sum(not name.endswith(ENDING) for name in model.bodies) + 1  # carriages follow the bodies
+    length = _size(tuple(groups), model.guess["position"][:, :count])
+    base = model_of(model.bodies, parts, model.guess, length, model.history)
+    system = with_fields(base.system, forces=system.forces, outputs=system.outputs)
+    return dataclasses.replace(base, system=system, forces=model.forces, outputs=model.outputs)
 
 
 def model_of(
@@ -211,8 +213,8 @@ def model_of(
     row_counts = [_row_count(group, pose_type, guess) for group in groups]
     rows = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
     drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
-    joined = tuple(group.bodies for group in groups)
-    pattern, fronts = _layout(joined, tuple(row_counts), pose_type.shifts + pose_type.turns, len(bodies))
+    slots = tuple(group.bodies for group in groups)
+    pattern, fronts = _layout(slots, tuple(row_counts), pose_type.shifts + pose_type.turns, len(bodies))
     system = {
         "groups": groups,
         "outputs": outputs,
@@ -251,8 +253,8 @@ def grouped_elements(mechanism: Mechanism, *, initial: bool = False) -> tuple[Gr
             mechanism, {name: v for name, v in elements.items() if not isinstance(v, AbstractMotionOutput)}
         )
 
-    held = grouped("joints", "drivers", "initial") if initial else grouped("joints", "drivers")
-    return held, grouped("forces"), grouped("outputs")
+    restricted = grouped("joints", "drivers", "initial") if initial else grouped("joints", "drivers")
+    return restricted, grouped("forces"), grouped("outputs")
 
 
 def with_reference(

@@ -33,14 +33,14 @@ MOST = 4  # stored models
 _results: OrderedDict[Contents, Any] = OrderedDict()  # None for contents that were seen once
 
 
-def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
-    """Return everything that the model of a mechanism depends on, and `more`; None if values do not determine it.
+def contents_of(mechanism: Mechanism, *extras: Any) -> Contents | None:
+    """Return everything that the model of a mechanism depends on, and `extras`; None if values do not determine it.
 
     Values are distinguished by type, and to the last bit: 0.0 from -0.0, and 1 from 1.0.
     """
     values: list[Any] = []
     kinds: list[type] = []
-    pending: list[Any] = [mechanism.parameter_values, *more, *(getattr(mechanism, name) for name in FIELDS)]
+    pending: list[Any] = [mechanism.parameter_values, *extras, *(getattr(mechanism, name) for name in FIELDS)]
     while pending:
         value = pending.pop()
         kind = type(value)
@@ -68,8 +68,8 @@ def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
                 pending += read(vars(value))
             except KeyError:  # a field that is not in the dictionary of the instance
                 return None
-    different = set(kinds)
-    if not different.isdisjoint(CHECKED) or any(map(has_own_methods, different)):
+    classes = set(kinds)
+    if not classes.isdisjoint(CHECKED) or any(map(has_own_methods, classes)):
         return None
     return tuple(kinds), marshal.dumps(values, 2)  # later versions depend on the reference counts of values
 
@@ -80,7 +80,7 @@ def _given_fields(kind: type) -> Callable[[Mapping[str, Any]], Sequence[Any]] | 
     if not belongs_to_package(kind) or not dataclasses.is_dataclass(kind):
         return None
     names = [field.name for field in dataclasses.fields(kind) if field.init]
-    return itemgetter(*names) if len(names) > 1 else lambda own: [own[name] for name in names]
+    return itemgetter(*names) if len(names) > 1 else lambda values: [values[name] for name in names]
 
 
 def made_or_stored(contents: Contents | None, make: Callable[[], T], owned: Callable[[T], T | None]) -> T:

@@ -20,8 +20,8 @@ def element_indices(model: Model) -> dict[str, ElementIndex]:
     indices = {}
     for index, (group, rows) in enumerate(zip(model.system.groups, group_rows(model), strict=True)):
         for instance, name in enumerate(model.rows[rows][: group.instances]):
-            own = range(rows.start + instance, rows.stop, group.instances)
-            indices[name.partition(".")[2]] = ElementIndex(index, instance, rows, own)
+            row_range = range(rows.start + instance, rows.stop, group.instances)
+            indices[name.partition(".")[2]] = ElementIndex(index, instance, rows, row_range)
     return indices
 
 

@@ -77,13 +77,13 @@ def concrete_or(
     return partial(concrete, traced=traced)
 
 
-def check_holonomic(mechanism: Any, what: str, instead: str = "simulate the motion") -> None:
-    """Raise UnsupportedError if a mechanism has a nonholonomic joint; `what` names the request."""
+def check_holonomic(mechanism: Any, request: str, remedy: str = "simulate the motion") -> None:
+    """Raise UnsupportedError if a mechanism has a nonholonomic joint; `request` names what is requested."""
     for name, joint in mechanism.joints.items():
         if getattr(joint, "nonholonomic", False):
             message = (
-                f"{what} follows from positions, and a {joint.type_name} that rolls restricts velocities alone, so "
-                f"that where it is depends on the way there: {instead}"
+                f"{request} follows from positions, and a {joint.type_name} that rolls restricts velocities alone, so "
+                f"that where it is depends on the way there: {remedy}"
             )
             raise UnsupportedError(message, name=f"joints.{name}")
 
@@ -114,8 +114,8 @@ def holds_tracer(given: Mapping[str, Any]) -> bool:
         if names is None:
             pending += value.values()
         elif names:
-            own = getattr(value, "__dict__", None)
-            pending += [getattr(value, name, None) for name in names] if own is None else map(own.get, names)
+            fields = getattr(value, "__dict__", None)
+            pending += [getattr(value, name, None) for name in names] if fields is None else map(fields.get, names)
         elif isinstance(value, list | tuple):
             pending += value
         elif isinstance(value, Tracer):
@@ -129,9 +129,9 @@ def _entries(value: Any) -> list[tuple[str | int, Any]]:
     if names is None:
         return list(value.items())
     if names:  # read from the dictionary of the object: attribute access of Equinox modules is slow
-        own = getattr(value, "__dict__", None)
-        held = partial(getattr, value) if own is None else own.get
-        return [(name, held(name, None)) for name in names]
+        fields = getattr(value, "__dict__", None)
+        read = partial(getattr, value) if fields is None else fields.get
+        return [(name, read(name, None)) for name in names]
     return list(enumerate(value)) if isinstance(value, list | tuple) else []
 
 

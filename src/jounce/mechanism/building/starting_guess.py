@@ -20,11 +20,11 @@ from jounce.rigid.pose import Pose
 def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components: int) -> dict[str, Any]:
     """Return the coordinates of all bodies at the starting guess, the ground first."""
     positions, attitudes = [np.zeros(components)], [np.zeros(()) if components == 2 else np.array([1.0, 0, 0, 0])]
-    whole = (GROUND, *mechanism.rigid_bodies)
+    names = (GROUND, *mechanism.rigid_bodies)
     for name, body in mechanism.bodies.items():
         location = f"bodies.{name}"
         if isinstance(body, Carriage):
-            poses = dict(zip(whole, zip(positions, attitudes, strict=False), strict=False))
+            poses = dict(zip(names, zip(positions, attitudes, strict=False), strict=False))
             positions.append(_carriage_guess(mechanism, name, body, poses, parameters, components))
             attitudes.append(attitudes[0])
             continue

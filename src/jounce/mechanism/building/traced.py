@@ -73,20 +73,20 @@ def _maker(value: Any, values: list[Any]) -> Callable[[Iterator[Any]], Any] | No
     if kind in PLAIN or isinstance(value, type):
         return None
     if isinstance(value, Mapping):
-        parts, joined = dict(value), dict
+        parts, constructor = dict(value), dict
     elif isinstance(value, list | tuple):
         parts = dict(enumerate(value))
-        joined = partial(_as_sequence, kind)
+        constructor = partial(_as_sequence, kind)
     elif dataclasses.is_dataclass(kind):
         names = [name for name in fields_of(kind) or () if hasattr(value, name)]
-        parts, joined = {name: getattr(value, name) for name in names}, partial(_copied, kind)
+        parts, constructor = {name: getattr(value, name) for name in names}, partial(_copied, kind)
     else:
         return None
     makers = {key: maker for key, part in parts.items() if (maker := _maker(part, values)) is not None}
     if not makers:
         return None
     fixed = parts | dict.fromkeys(makers)  # without the traced values
-    return lambda left: joined(fixed | {key: maker(left) for key, maker in makers.items()})
+    return lambda new_values: constructor(fixed | {key: maker(new_values) for key, maker in makers.items()})
 
 
 def _as_sequence(kind: type[Any], parts: Mapping[Any, Any]) -> Any:
@@ -135,11 +135,11 @@ def traced_model(
     parts = [groups, *(part for part, _ in others)]
     if angles is not None and any(measures_angle(group) for part in parts for group in part):
         assert first is not None
-        near = (angles.angle[0], *angles.near)
-        parts = [_counted(*each, pose_at(first, pose_type)) for each in zip(parts, angles.angle, near, strict=True)]
-    named = zip(parts, (names, *(label for _, label in others)), strict=True)
-    whole: Any = tuple(named)
-    model = model_of(tuple(mechanism.bodies), whole, guess, 1.0, None)
+        turn = (angles.angle[0], *angles.near)
+        parts = [_counted(*arrays, pose_at(first, pose_type)) for arrays in zip(parts, angles.angle, turn, strict=True)]
+    pairs = zip(parts, (names, *(label for _, label in others)), strict=True)
+    labeled_parts: Any = tuple(pairs)
+    model = model_of(tuple(mechanism.bodies), labeled_parts, guess, 1.0, None)
     scale = jnp.concatenate([jnp.full(components, length), jnp.ones(pose_type.turns)])
     return dataclasses.replace(model, system=with_fields(model.system, column_scale=scale))
 
@@ -158,8 +158,8 @@ def _with_plain_orientations(mechanism: Mechanism) -> Mechanism:
                 "orientation there; give the offset",
                 name=f"bodies.{traced[0]}.orientation",
             )
-    plain = {name: dataclasses.replace(mechanism.bodies[name], orientation=None) for name in traced}
-    return dataclasses.replace(mechanism, bodies={**mechanism.bodies, **plain})
+    bodies = {name: dataclasses.replace(mechanism.bodies[name], orientation=None) for name in traced}
+    return dataclasses.replace(mechanism, bodies={**mechanism.bodies, **bodies})
 
 
 def _depends(orientation: Any, values: Mapping[str, Any]) -> bool:

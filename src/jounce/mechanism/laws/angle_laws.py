@@ -53,10 +53,10 @@ def laws_of_angles(mechanism: Mechanism) -> Iterator[DriverLaw]:
 def laws_of(mechanism: Mechanism, dimension: Literal["angle", "length"]) -> Iterator[DriverLaw]:
     """Yield the valid laws of drivers of angles or of lengths; invalid laws are refused when used."""
     try:
-        held, parameters = with_output_drivers(mechanism), mechanism.parameter_values
+        converted, parameters = with_output_drivers(mechanism), mechanism.parameter_values
     except JounceError:
         return
-    for name, driver in held.drivers.items():
+    for name, driver in converted.drivers.items():
         motion = getattr(driver, "motion", None)
         fits = is_turning(driver) if dimension == "angle" else dimension_of_field(driver, "motion") == dimension
         if motion is None or not fits:
@@ -72,18 +72,20 @@ def laws_of(mechanism: Mechanism, dimension: Literal["angle", "length"]) -> Iter
 def degrees_doubt(law: AbstractMotion, first: float, last: float) -> str:
     """Return why an angle law is likely in degrees, by its values between two instants, s; an empty text if not."""
     values = values_of(law, first, last)
-    if values is not None and (why := degrees_meant(values)):
-        return why
+    if values is not None and (doubt := degrees_meant(values)):
+        return doubt
     if (interval := _angle_of_leader(law)) and looks_like_degrees(interval):
         return f"goes on over {interval:g} rad of its leader, {interval / TURN:.2g} turns: degrees?"
     return ""
 
 
-def names_angle(of: DriverLaw, angles: frozenset[str] = frozenset()) -> bool:
+def names_angle(driver_law: DriverLaw, angles: frozenset[str] = frozenset()) -> bool:
     """Return whether a law is an expression with an angle unit, or with a parameter that is an angle."""
-    if not isinstance(of.law, ExpressionMotion) or not isinstance(getattr(of.driver, "motion", None), Expression | str):
+    if not isinstance(driver_law.law, ExpressionMotion) or not isinstance(
+        getattr(driver_law.driver, "motion", None), Expression | str
+    ):
         return False
-    return "deg" in of.law.expression.text or bool(angles & of.law.expression.names)
+    return "deg" in driver_law.law.expression.text or bool(angles & driver_law.law.expression.names)
 
 
 def settle(driver: AbstractConstraint) -> None:
@@ -113,9 +115,9 @@ def warn_of_degrees(mechanism: Mechanism, first: float, last: float) -> None:
     for angle_law in laws_of_angles(mechanism):
         if _settled.get(id(angle_law.driver)) is angle_law.driver or names_angle(angle_law):
             continue
-        if why := _constant_doubt(angle_law.law) or degrees_doubt(angle_law.law, first, last):
+        if doubt := _constant_doubt(angle_law.law) or degrees_doubt(angle_law.law, first, last):
             settle(angle_law.driver)
-            warn_caller(UnitWarning(f"drivers.{angle_law.name}.motion: {why} {IN_SI}"))
+            warn_caller(UnitWarning(f"drivers.{angle_law.name}.motion: {doubt} {IN_SI}"))
 
 
 def _constant_doubt(law: AbstractMotion) -> str:
@@ -144,5 +146,5 @@ def _angle_of_leader(law: AbstractMotion) -> float | None:
     """Return the range of the leader coordinate over which a law is given; None without a leader or without ends."""
     if not isinstance(law, FollowingMotion) or not law.parts:
         return None
-    own = law.parts[0]
-    return float(own.stop) - float(np.asarray(own.breakpoints)[0]) if isinstance(own, SplineMotion) else None
+    motion = law.parts[0]
+    return float(motion.stop) - float(np.asarray(motion.breakpoints)[0]) if isinstance(motion, SplineMotion) else None

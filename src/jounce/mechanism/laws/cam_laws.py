@@ -90,9 +90,9 @@ def check_turns(mechanism: Mechanism, model: Model, coordinates: Mapping[str, An
             continue
         given = _law_value(model, f"drivers.{leader}", instant)
         place = np.asarray(coordinates["position"])[:, 1 + model.bodies.index(carriage_of(name)), 0]
-        if abs(counted := place[0] / place[-1] - given) > 1.0:
+        if abs(gap := place[0] / place[-1] - given) > 1.0:
             message = (
-                f"its leader starts at {given:g} rad by the law of {leader}, and {abs(counted) / WHOLE_TURN:.3g} turns "
+                f"its leader starts at {given:g} rad by the law of {leader}, and {abs(gap) / WHOLE_TURN:.3g} turns "
                 "of it were not counted on the way from the starting guess: start the law less than 100 turns from it"
             )
             raise MechanismError(message, name=f"joints.{name}.motion.of")
@@ -120,7 +120,7 @@ def cams_in_time(mechanism: Mechanism) -> Iterator[tuple[str, FollowingMotion]]:
         if motion is None or isinstance(motion, OutputMotion):
             continue
         try:
-            law, led = (resolve_motion(x, values) for x in (cam.motion, motion))
+            law, leader_law = (resolve_motion(x, values) for x in (cam.motion, motion))
         except JounceError:
             continue
-        yield name, FollowingMotion(law, led)
+        yield name, FollowingMotion(law, leader_law)

@@ -13,9 +13,9 @@ def is_turning(driver: Any) -> bool:
 
     A class that does not state the dimension of its law drives an angle if it has no points.
     """
-    stated = dimension_of_field(driver, "motion")
-    if stated != "any":
-        return stated == "angle"
+    dimension = dimension_of_field(driver, "motion")
+    if dimension != "any":
+        return dimension == "angle"
     return not any(stem_of(field) == "point" for field in value_fields(type(driver)))
 
 

@@ -59,8 +59,8 @@ def breaks_of_laws(
 @under_own_settings
 def laws_may_break(mechanism: Mechanism, *, forces: bool | None = None) -> bool:
     """Return whether a law that `breaks_of_laws` searches may jump or bend anywhere, whatever the parameter values."""
-    counted = _shows_forces(mechanism) if forces is None else forces
-    return any(map(may_break, laws_of(mechanism))) or (counted and any(map(may_break, laws_of_forces(mechanism))))
+    with_forces = _shows_forces(mechanism) if forces is None else forces
+    return any(map(may_break, laws_of(mechanism))) or (with_forces and any(map(may_break, laws_of_forces(mechanism))))
 
 
 @under_own_settings

@@ -49,13 +49,13 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
     parts = [("drivers", first, last, order)]
     if forces:
         parts += [("initial", start, start, 1), ("forces", first, last, order - 2)]
-    for kind, since, until, orders in parts:
+    for kind, lower, upper, orders in parts:
         for name, element in getattr(mechanism, kind).items():
             for field, law in _motions(element):
                 location = f"{kind}.{name}.{field}"
                 try:
                     law = law.resolved(mechanism.parameter_values)
-                    law.check_instants(since, until)
+                    law.check_instants(lower, upper)
                 except JounceError as error:
                     raise error.located(name=location) from None
                 if orders >= 0 and isinstance(law, SplineMotion):

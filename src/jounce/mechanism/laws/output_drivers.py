@@ -36,16 +36,16 @@ def output_laws(mechanism: Mechanism) -> dict[str, OutputMotion]:
 
 def with_outputs(mechanism: Mechanism, outputs: Mapping[str, AbstractQuantity]) -> Mechanism:
     """Return the mechanism with other outputs, and with those of its own outputs that drivers follow."""
-    followed = {motion.output for motion in output_laws(mechanism).values()}
-    followed |= {name.rpartition("_")[0] for name in followed}
-    followed_outputs = {name: output for name, output in mechanism.outputs.items() if name in followed}
+    names = {motion.output for motion in output_laws(mechanism).values()}
+    names |= {name.rpartition("_")[0] for name in names}
+    followed_outputs = {name: output for name, output in mechanism.outputs.items() if name in names}
     return dataclasses.replace(mechanism, outputs={**followed_outputs, **outputs})
 
 
 def without_output_laws(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with zero laws for the drivers that follow from outputs."""
-    led = {name: dataclasses.replace(mechanism.drivers[name], motion=0.0) for name in output_laws(mechanism)}
-    return dataclasses.replace(mechanism, drivers={**mechanism.drivers, **led}) if led else mechanism
+    drivers = {name: dataclasses.replace(mechanism.drivers[name], motion=0.0) for name in output_laws(mechanism)}
+    return dataclasses.replace(mechanism, drivers={**mechanism.drivers, **drivers}) if drivers else mechanism
 
 
 def with_output_drivers(mechanism: Mechanism) -> Mechanism:
@@ -60,25 +60,25 @@ def with_output_drivers(mechanism: Mechanism) -> Mechanism:
     MechanismError
         If an output does not exist, cannot be held, or is held twice, or the class of its driver defines no coordinate.
     """
-    led = output_laws(mechanism)
-    if not led:
+    laws = output_laws(mechanism)
+    if not laws:
         return mechanism
-    held = dict(mechanism.drivers)
-    for name, motion in led.items():
+    drivers = dict(mechanism.drivers)
+    for name, motion in laws.items():
         location = f"drivers.{name}.motion"
         if not hasattr(mechanism.drivers[name], "evaluate"):
             message = "the class of this driver does not define its coordinate; give it a method evaluate"
             raise MechanismError(message, name=location, value=type(mechanism.drivers[name]).__name__)
-        twice = [other for other, other_motion in led.items() if other_motion.output == motion.output and other != name]
-        if twice:
+        others = [other for other, law in laws.items() if law.output == motion.output and other != name]
+        if others:
             raise MechanismError(
-                f"the driver '{twice[0]}' follows from this output already",
+                f"the driver '{others[0]}' follows from this output already",
                 name=f"{location}.output",
                 value=motion.output,
             )
-        held[name] = driver_of_output(mechanism, motion, f"{location}.output")
+        drivers[name] = driver_of_output(mechanism, motion, f"{location}.output")
     outputs = {name: x for name, x in mechanism.outputs.items() if not isinstance(x, AbstractMotionOutput)}
-    return dataclasses.replace(mechanism, drivers=held, outputs=outputs)
+    return dataclasses.replace(mechanism, drivers=drivers, outputs=outputs)
 
 
 def driver_of_output(mechanism: Any, motion: OutputMotion, location: str) -> AbstractConstraint:
@@ -98,8 +98,8 @@ def driver_of_output(mechanism: Any, motion: OutputMotion, location: str) -> Abs
         case PointOutput() if component is not None:
             kind = SpatialSlideDriver if spatial else SlideDriver
             size = POSITION_COMPONENTS[mechanism.space]
-            along = [float(k == component) for k in range(size)]
-            return kind((GROUND, *output.bodies), [0.0] * size, output.point, along, law)
+            direction = [float(k == component) for k in range(size)]
+            return kind((GROUND, *output.bodies), [0.0] * size, output.point, direction, law)
     if {"point_i", "point_j", "vector_i"} <= {field.name for field in dataclasses.fields(output)}:  # a slide output
         kind = SpatialSlideDriver if spatial else SlideDriver
         return kind(output.bodies, output.point_i, output.point_j, output.vector_i, law)

@@ -109,7 +109,7 @@ def continued(
     output: EulerAnglesOutput,
     angles: Float[np.ndarray, "3 time"],
     instants: Float[np.ndarray, " time"],
-    passed: tuple[Float[np.ndarray, " place"], Float[np.ndarray, "3 place"]],
+    samples: tuple[Float[np.ndarray, " place"], Float[np.ndarray, "3 place"]],
 ) -> Float[np.ndarray, "3 time"]:
     """Return angles made continuous along a motion, rad, (3, time).
 
@@ -121,19 +121,19 @@ def continued(
         Angles up to whole turns; instants with angles that are not finite are ignored.
     instants : array of shape (time,)
         Instants of the angles, s.
-    passed : tuple
+    samples : tuple
         Instants in the order of the motion, (places,), and the angles there, up to whole turns, (3, places), close
         enough to each other that no turn is missed.
     """
-    between, previous = passed
-    whole = np.concatenate([previous, angles], axis=1)
-    times = np.concatenate([between, instants])
-    order = np.argsort(-times if between.size > 1 and between[-1] < between[0] else times, kind="stable")
-    order = order[np.isfinite(whole[:, order]).all(axis=0)]
+    sample_times, sample_angles = samples
+    all_angles = np.concatenate([sample_angles, angles], axis=1)
+    times = np.concatenate([sample_times, instants])
+    order = np.argsort(-times if sample_times.size > 1 and sample_times[-1] < sample_times[0] else times, kind="stable")
+    order = order[np.isfinite(all_angles[:, order]).all(axis=0)]
     for k, wraps in enumerate(output.wraps):
         if wraps:
-            whole[k, order] = counted_on(whole[k, order])
-    return whole[:, between.size :]
+            all_angles[k, order] = counted_on(all_angles[k, order])
+    return all_angles[:, sample_times.size :]
 
 
 def euler_angles_of(sequence: str, attitudes: Float[np.ndarray, "4 place"]) -> Float[np.ndarray, "3 place"]:

@@ -138,8 +138,8 @@ class ParameterOutput(AbstractOutput):
         check_name("joint", self.joint, mechanism.joints, MechanismError, name="joint")
         number = len(mechanism.joints[self.joint].hidden)
         if number != self.count:
-            words = {0: "nothing with a parameter", 1: "a curve, of one parameter", 2: "a surface, of parameters"}
-            raise MechanismError(f"this joint has {words[number]}", name="quantity")
+            nouns = {0: "nothing with a parameter", 1: "a curve, of one parameter", 2: "a surface, of parameters"}
+            raise MechanismError(f"this joint has {nouns[number]}", name="quantity")
 
     def evaluate(self, carriage: Pose) -> Jet:
         return carriage.position[0] / carriage.position[-1]

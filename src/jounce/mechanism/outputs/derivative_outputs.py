@@ -92,9 +92,9 @@ class DerivativeOutput(AbstractMotionOutput):
         missing = ~np.isfinite(values).all(axis=1) & (np.asarray(motion.status) == 0)
         if not missing.any():
             return ""
-        where = ", ".join(f"{t:.6g} s" for t in motion.time[missing][:MOST_NAMED])
-        more = ", ..." if missing.sum() > MOST_NAMED else ""
-        return f"undefined at t = {where}{more}, where '{self.by}' stands still or '{self.of}' is undefined"
+        times = ", ".join(f"{t:.6g} s" for t in motion.time[missing][:MOST_NAMED])
+        ellipsis = ", ..." if missing.sum() > MOST_NAMED else ""
+        return f"undefined at t = {times}{ellipsis}, where '{self.by}' stands still or '{self.of}' is undefined"
 
 
 class PosedDerivativeOutput(AbstractOutput):
@@ -207,19 +207,19 @@ def _bind(
     outputs: Mapping[str, AbstractQuantity],
     mechanism: Any,
     bound_outputs: dict[str, AbstractQuantity],
-    waiting: tuple[str, ...],
+    ancestors: tuple[str, ...],
 ) -> AbstractQuantity:
     """Return an output, bound to its operands, which are added to `bound_outputs`."""
     output: Any = outputs[name]
     if name in bound_outputs or form_of(output) is not DerivativeOutput:
         return bound_outputs.setdefault(name, output)
-    if name in waiting:
+    if name in ancestors:
         raise MechanismError("this derivative is one of itself", name=f"outputs.{name}.of", value=output.of)
     stems = [_base_output(given, outputs, mechanism) for given in (output.of, output.by)]
     if all(stems) or getattr(output, "bound_operands", output) is None:
-        own = {stem: _bind(stem, outputs, mechanism, bound_outputs, (*waiting, name)) for stem in stems if stem}
+        operands = {stem: _bind(stem, outputs, mechanism, bound_outputs, (*ancestors, name)) for stem in stems if stem}
         try:
-            output = _with_operands(output, {**outputs, **own}, mechanism)
+            output = _with_operands(output, {**outputs, **operands}, mechanism)
         except MechanismError as error:
             error.name = f"outputs.{name}.{error.name}"
             raise
@@ -237,9 +237,9 @@ def _base_output(name: str, outputs: Mapping[str, AbstractQuantity], mechanism: 
 def _with_operands(output: Any, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> AbstractQuantity:
     """Return a derivative with its operands."""
     of, by = (_operand(key, getattr(output, key), outputs, mechanism) for key in ("of", "by"))
-    words = {"of": output.of, "by": output.by, "order": output.order}
+    fields = {"of": output.of, "by": output.by, "order": output.order}
     if not (_posed(of.output) and _posed(by.output)):
-        return with_fields(DerivativeOutput(**words), bound_operands=(of, by))
+        return with_fields(DerivativeOutput(**fields), bound_operands=(of, by))
     values = {
         "bodies": (*of.output.bodies, *by.output.bodies),
         "first": of.output,
@@ -247,7 +247,7 @@ def _with_operands(output: Any, outputs: Mapping[str, AbstractQuantity], mechani
         "components": (of.component, by.component),
         "count": len(of.output.bodies),
     }
-    return unchecked(PosedDerivativeOutput, words | values)
+    return unchecked(PosedDerivativeOutput, fields | values)
 
 
 def _operand(key: str, name: str, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Operand:
@@ -256,7 +256,7 @@ def _operand(key: str, name: str, outputs: Mapping[str, AbstractQuantity], mecha
     if not stem:
         labels = {other: output.component_labels(mechanism) for other, output in outputs.items()}
         valid_names = [
-            each for other, components in labels.items() for each in ([f"{other}_{x}" for x in components] or [other])
+            item for other, components in labels.items() for item in ([f"{other}_{x}" for x in components] or [other])
         ]
         raise MechanismError(no_such("output", name, valid_names), name=key, value=name)
     labels = outputs[stem].component_labels(mechanism)
@@ -284,9 +284,9 @@ def quotient_unit(of: str, by: str, order: int) -> str:
     """
     powers: Counter[str] = Counter()
     for unit, power in ((of, 1), (by, -order)):
-        first, *below = unit.split("/")
+        first, *denominators = unit.split("/")
         powers[first] += power
-        for part in below:
+        for part in denominators:
             base, _, exponent = part.partition("^")
             powers[base] -= power * int(exponent or 1)
     del powers["1"]
@@ -294,7 +294,7 @@ def quotient_unit(of: str, by: str, order: int) -> str:
     def written(base: str, power: int) -> str:
         return base if power == 1 else f"({base})^{power}" if "*" in base else f"{base}^{power}"
 
-    above = "*".join(written(base, power) for base, power in powers.items() if power > 0)
-    below = [(part, -power) for base, power in powers.items() if power < 0 for part in base.split("*")]
-    below.sort(key=lambda pair: pair[0] == "s")
-    return (above or "1") + "".join(f"/{written(*pair)}" for pair in below)
+    numerator = "*".join(written(base, power) for base, power in powers.items() if power > 0)
+    denominators = [(part, -power) for base, power in powers.items() if power < 0 for part in base.split("*")]
+    denominators.sort(key=lambda pair: pair[0] == "s")
+    return (numerator or "1") + "".join(f"/{written(*pair)}" for pair in denominators)

@@ -38,12 +38,12 @@ class ProjectedAngleOutput(AbstractOutput):
 
     def evaluate(self, body_i: SpatialPose, body_j: SpatialPose, body_m: SpatialPose) -> Jet:
         line = body_m.point(self.point_m) - body_j.point(self.point_j)
-        seen = stack([axis.dot(line) for axis in body_i.axes])
+        projected = stack([axis.dot(line) for axis in body_i.axes])
         normal = self.normal / length_of(self.normal)[None]
         first = self.vector_i - dot(self.vector_i, normal)[None] * normal
         first = first / length_of(first)[None]
-        along, across = seen.dot(first), seen.dot(cross(normal, first))
-        return nan_where_rounding_in_plane(atan2(across, along), stack([along, across]), seen)
+        along, across = projected.dot(first), projected.dot(cross(normal, first))
+        return nan_where_rounding_in_plane(atan2(across, along), stack([along, across]), projected)
 
 
 class _CenterOutput(AbstractOutput):
@@ -70,10 +70,10 @@ class InstantCenterOutput(_CenterOutput):
 
     def evaluate(self, body_i: PlanarPose, body_j: PlanarPose) -> Jet:
         position = body_i.to_body(body_j.position - body_i.position)
-        turning = (body_j.angle - body_i.angle).differentiate()
-        arm = position.differentiate() / turning
+        rate = (body_j.angle - body_i.angle).differentiate()
+        arm = position.differentiate() / rate
         center = position.truncate(arm.order) + perpendicular(arm)
-        center = _nan_without_rotation(center, turning)
+        center = _nan_without_rotation(center, rate)
         if self.frame == "body":
             return center
         return (body_i.position + body_i.direction(center)).truncate(center.order)
@@ -98,7 +98,7 @@ class SpatialInstantCenterOutput(_CenterOutput):
 
     def evaluate(self, body_i: SpatialPose, body_j: SpatialPose) -> Jet:
         normal = body_i.direction(self.normal / length_of(self.normal)[None])
-        position, turning = body_i.point(self.point_i), _spin(body_j) - _spin(body_i)
+        position, spin = body_i.point(self.point_i), _spin(body_j) - _spin(body_i)
         # `position` is a point of body i; the coincident point of body j moves relative to it
         velocity = (
             body_j.position.differentiate()
@@ -106,9 +106,9 @@ class SpatialInstantCenterOutput(_CenterOutput):
             - body_i.position.differentiate()
             - _spin(body_i).cross(position - body_i.position)
         )
-        about = normal.dot(turning)
-        center = position + normal.cross(velocity) / about
-        center = _nan_without_rotation(center, about)
+        rate = normal.dot(spin)
+        center = position + normal.cross(velocity) / rate
+        center = _nan_without_rotation(center, rate)
         if self.frame == "body":
             offset = center - body_i.position
             return stack([axis.dot(offset) for axis in body_i.axes])
@@ -161,13 +161,13 @@ class SymmetricRollCenterOutput(_CenterOutput):
         position = body.point(self.point)
         velocity = position.differentiate()
         line = cross(normal, velocity)
-        onward = line.dot(lateral)
-        center = position - line * (position.dot(lateral) / onward)
-        batch = jnp.ndim(onward.coefficients[0])
+        component = line.dot(lateral)
+        center = position - line * (position.dot(lateral) / component)
+        batch = jnp.ndim(component.coefficients[0])
         scale = sizes(position, batch)[0]
         rate = rates_of(velocity - velocity.dot(normal) * normal, scale, batch)[1]
         square = jnp.broadcast_to(jnp.abs(dot(normal, lateral)) < PERPENDICULAR, jnp.shape(scale))
-        return nan_where_rounding(center, rates_of(onward, scale, batch)[0], rate, lost=1, also=square)
+        return nan_where_rounding(center, rates_of(component, scale, batch)[0], rate, lost=1, also=square)
 
 
 def _spin(body: SpatialPose) -> Jet:
@@ -180,10 +180,10 @@ def _in_frame(frame: SpatialPose, position: Jet) -> Jet:
     return stack([axis.dot(offset) for axis in frame.axes])
 
 
-def _nan_without_rotation(center: Jet, turning: Jet) -> Jet:
+def _nan_without_rotation(center: Jet, rate: Jet) -> Jet:
     """Return a center with NaN where the angular rate by which it was divided vanishes."""
-    batch = jnp.ndim(turning.coefficients[0])
-    return nan_where_rounding(center, *rates_of(turning, jnp.ones_like(turning.coefficients[0]), batch))
+    batch = jnp.ndim(rate.coefficients[0])
+    return nan_where_rounding(center, *rates_of(rate, jnp.ones_like(rate.coefficients[0]), batch))
 
 
 def _intersection(normal: Any, first: Jet, second: Jet, first_rate: Jet, second_rate: Jet) -> Jet:
@@ -192,14 +192,14 @@ def _intersection(normal: Any, first: Jet, second: Jet, first_rate: Jet, second_
     def flat(vector: Jet) -> Jet:
         return vector - vector.dot(normal) * normal
 
-    between = second - first
-    middle = between.dot(normal) * (0.5 * normal)
+    difference = second - first
+    middle = difference.dot(normal) * (0.5 * normal)
     v, w = flat(first_rate), flat(second_rate)
     area = dot(cross(v, w), normal)
-    reach = flat(between).dot(w) / area
-    center = first + middle + cross(normal, v) * reach
+    factor = flat(difference).dot(w) / area
+    center = first + middle + cross(normal, v) * factor
     batch = jnp.ndim(area.coefficients[0])
-    scale = sizes(between, batch)[0]
+    scale = sizes(difference, batch)[0]
     slow, fast = sizes(v, batch)[0], sizes(w, batch)[0]
     rates = [rates_of(speed, scale, batch) for speed in (v, w)]
     for pair in rates:

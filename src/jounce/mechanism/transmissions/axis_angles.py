@@ -73,8 +73,8 @@ class AttitudeHistory(NamedTuple):
         between, angles = self.between, measure(self.quaternion)
         if between is None:
             return self.time, angles
-        whole = np.zeros(len(self.time), int)  # a single path, with time as its parameter
-        samples = refined_samples(lambda _, instants: measure(between(instants)), whole, self.time, angles)
+        path = np.zeros(len(self.time), int)  # a single path, with time as its parameter
+        samples = refined_samples(lambda _, instants: measure(between(instants)), path, self.time, angles)
         return samples.share, samples.angle
 
     def angles(self, group: Group) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "instance sample"]]:
@@ -93,12 +93,12 @@ class AttitudeHistory(NamedTuple):
 
     def counting(self, groups: Sequence[Group], instants: Float[np.ndarray, " time"]) -> tuple[Group, ...]:
         """Return groups with the turns at each instant, taken from the sample nearest in time."""
-        counted = []
+        turns = []
         for time, angles in (self.angles(group) for group in groups if measures_angle(group)):
             backward = time[-1] < time[0]
             sample_times, angles = (time[::-1], angles[:, ::-1]) if backward else (time, angles)
-            counted.append(angles[:, nearest_instants(sample_times, instants)])
-        return with_turns(groups, counted)
+            turns.append(angles[:, nearest_instants(sample_times, instants)])
+        return with_turns(groups, turns)
 
 
 def measures_angle(group: Group) -> bool:
@@ -254,10 +254,10 @@ def lost_count(groups: Sequence[Group], history: AttitudeHistory) -> tuple[int, 
         time, raw = history.sampled(lambda quaternion, g=group: _shaft_angles(g, quaternion))
         first, second = np.split(counted_on(raw), 2)
         excess = second - np.asarray(group.element.ratio) * first
-        lost = np.abs(excess - excess[:, :1]) > np.pi / 2 / np.asarray(whole)
-        if lost.any():
-            instance = int(np.argmax(lost.any(axis=1)))
-            return index, instance, float(time[np.argmax(lost[instance])])
+        is_lost = np.abs(excess - excess[:, :1]) > np.pi / 2 / np.asarray(whole)
+        if is_lost.any():
+            instance = int(np.argmax(is_lost.any(axis=1)))
+            return index, instance, float(time[np.argmax(is_lost[instance])])
     return None
 
 

@@ -51,14 +51,14 @@ def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None
             )
             raise MechanismError(message, name=f"{members[0]}.axes")
         if isinstance(group.element, spatial.Gear) and not isinstance(group.element.whole, Tracer):
-            odd = np.flatnonzero(np.isnan(group.element.whole))
-            if odd.size:
+            invalid = np.flatnonzero(np.isnan(group.element.whole))
+            if invalid.size:
                 message = (
                     f"must be one of whole numbers up to {LARGEST_WHOLE}, such as teeth, as attitudes tell angles up "
                     "to whole turns only: write it as 22/37"
                 )
-                value = float(np.asarray(group.element.ratio).ravel()[odd[0]])
-                raise MechanismError(message, name=f"{members[odd[0]]}.ratio", value=value)
+                value = float(np.asarray(group.element.ratio).ravel()[invalid[0]])
+                raise MechanismError(message, name=f"{members[invalid[0]]}.ratio", value=value)
 
 
 def _check_driving(friction: GearFriction, names: Sequence[str]) -> None:
@@ -66,13 +66,13 @@ def _check_driving(friction: GearFriction, names: Sequence[str]) -> None:
     forward = friction.efficiencies[0]
     if isinstance(forward, Tracer):
         return
-    odd = np.flatnonzero(~(np.asarray(forward).ravel() > 0))
-    if odd.size:
+    invalid = np.flatnonzero(~(np.asarray(forward).ravel() > 0))
+    if invalid.size:
         message = (
             "the worm cannot drive its wheel, as lead and friction angle together are 90 deg or more: give a smaller "
             "coefficient or lead angle, or the screw of the smaller lead angle as the first body"
         )
-        raise MechanismError(message, name=f"{names[odd[0]]}.friction")
+        raise MechanismError(message, name=f"{names[invalid[0]]}.friction")
 
 
 def _check_belts(belts: planar.Belt, names: Sequence[str]) -> None:
@@ -80,14 +80,14 @@ def _check_belts(belts: planar.Belt, names: Sequence[str]) -> None:
     if isinstance(belts.ratio, Tracer):
         return
     differences = np.abs(1.0 - np.asarray(belts.ratio)).ravel()
-    odd = np.flatnonzero((differences > 0) & (differences < LEAST_DIFFERENCE))
-    if odd.size:
+    invalid = np.flatnonzero((differences > 0) & (differences < LEAST_DIFFERENCE))
+    if invalid.size:
         message = (
             "radii that are nearly the same need one body that carries both pulleys, which counts the turns of the "
             "line of centers: pin both to it, or make the radii equal"
         )
-        values = [float(np.asarray(x).ravel()[odd[0]]) for x in (belts.radius_i, belts.radius_j)]
-        raise MechanismError(message, name=f"{names[odd[0]]}.radii", value=values)
+        values = [float(np.asarray(x).ravel()[invalid[0]]) for x in (belts.radius_i, belts.radius_j)]
+        raise MechanismError(message, name=f"{names[invalid[0]]}.radii", value=values)
 
 
 def _check_cams(cams: Cam, names: Sequence[str]) -> None:
@@ -117,12 +117,12 @@ def check_wheels(groups: Sequence[Group], names: Sequence[Sequence[str]], guess:
         wheel = group.element
         if not isinstance(wheel, spatial.Wheel):
             continue
-        plane, own = (guess["quaternion"][:, list(bodies)] for bodies in group.bodies)
+        plane, rim = (guess["quaternion"][:, list(bodies)] for bodies in group.bodies)
         on_plane, center = (
             guess["position"][:, list(bodies)] + turned(attitude, np.asarray(point))
-            for bodies, attitude, point in zip(group.bodies, (plane, own), (wheel.point_i, wheel.point_j), strict=True)
+            for bodies, attitude, point in zip(group.bodies, (plane, rim), (wheel.point_i, wheel.point_j), strict=True)
         )
-        normal, axis = turned(plane, np.asarray(wheel.normal_i)), turned(own, np.asarray(wheel.axis_j))
+        normal, axis = turned(plane, np.asarray(wheel.normal_i)), turned(rim, np.asarray(wheel.axis_j))
         sizes = np.linalg.norm(normal, axis=0) * np.linalg.norm(axis, axis=0)
         flat = np.linalg.norm(np.cross(normal, axis, axis=0), axis=0) <= FLAT * sizes
         height = ((center - on_plane) * normal).sum(axis=0) / np.linalg.norm(normal, axis=0)

@@ -121,10 +121,10 @@ def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[st
         ]
     except JounceError:
         return None  # raised when the values of the gear are resolved
-    plain = not any(isinstance(radius, Tracer) for radius in radii)
-    if plain and not all(math.isfinite(radius) and radius for radius in radii):
+    untraced = not any(isinstance(radius, Tracer) for radius in radii)
+    if untraced and not all(math.isfinite(radius) and radius for radius in radii):
         return None
-    size = sum(abs(radius) for radius in radii) if plain else 1.0
+    size = sum(abs(radius) for radius in radii) if untraced else 1.0
 
     def same(a: Any, b: Any) -> bool:
         return abs(a - b) <= LARGEST_GAP * size
@@ -139,7 +139,7 @@ def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[st
         return None
     body = GROUND if GROUND in shared else shared[0]
     line = [b - a for a, b in zip(first[body].value, second[body].value, strict=True)]
-    if plain and not any(isinstance(x, Tracer) for x in line):
+    if untraced and not any(isinstance(x, Tracer) for x in line):
         check = _check_gap if is_toothed(gear) else _check_overlap
         check(name, body, math.hypot(*line), [float(radius) for radius in radii])
         return Arm(body, math.atan2(line[1], line[0]))
@@ -185,27 +185,27 @@ def _check_overlap(name: str, body: str, distance: float, radii: Sequence[float]
 
 def _with_slots(elements: Mapping[str, Any]) -> dict[str, Any]:
     """Return elements in which a rope names each body once, also one with several of its points."""
-    changed = dict(elements)
+    result = dict(elements)
     for name, element in elements.items():
         if may_have_frame(type(element)) and shares_points(element):
             bodies, slots = distinct(element.bodies)
-            changed[name] = unchecked_copy(element, bodies=bodies, slots=slots)
-    return changed
+            result[name] = unchecked_copy(element, bodies=bodies, slots=slots)
+    return result
 
 
 def _with_arms(elements: Mapping[str, Any], arms: Mapping[str, Arm]) -> dict[str, Any]:
     """Return elements in which toothed gears and belts have a third body, their carrier."""
-    changed = dict(elements)
+    result = dict(elements)
     for name, arm in arms.items():
-        changed[name] = unchecked_copy(changed[name], bodies=(*changed[name].bodies, arm.body))
-    return changed
+        result[name] = unchecked_copy(result[name], bodies=(*result[name].bodies, arm.body))
+    return result
 
 
-def unchecked_copy(element: Any, **changed: Any) -> Any:
+def unchecked_copy(element: Any, **values: Any) -> Any:
     """Return an element with other values in some fields, without checks."""
     copy = object.__new__(type(element))
     for field in dataclasses.fields(element):
-        object.__setattr__(copy, field.name, changed.get(field.name, getattr(element, field.name)))
+        object.__setattr__(copy, field.name, values.get(field.name, getattr(element, field.name)))
     return copy
 
 
@@ -257,8 +257,8 @@ def _check_points_on_axes(gears: Mapping[str, spatial.Gear], mechanism: Mechanis
     for name, gear in gears.items():
         if gear.point_m is None:
             continue
-        for slot, ending in enumerate(("_i", "_j")):
-            body, given = gear.bodies[slot], [getattr(gear, field + ending) for field in ("axis", "point")]
+        for slot, suffix in enumerate(("_i", "_j")):
+            body, given = gear.bodies[slot], [getattr(gear, field + suffix) for field in ("axis", "point")]
             lines = [
                 [getattr(hinge, field + ("_i", "_j")[hinge.bodies.index(body)]) for field in ("axis", "point")]
                 for hinge in hinges
@@ -294,13 +294,13 @@ def _check_racks(racks: Mapping[str, spatial.Rolling], mechanism: Mechanism) -> 
     """Raise MechanismError unless a pinion turns on the rack about its axis, which is perpendicular to the rack."""
     hinges, parameters = joined_vectors(mechanism, held_parallel), mechanism.parameter_values
     for name, rack in racks.items():
-        on_rack, own, line = (
+        on_rack, pinion_axis, line = (
             body_vector(body, vector, parameters)
             for body, vector in zip(
                 (*rack.bodies, rack.bodies[0]), (rack.axis_i, rack.axis_j, rack.vector_i), strict=True
             )
         )
-        if any(isinstance(x, Tracer) for vector in (on_rack, own, line) for x in vector.value):
+        if any(isinstance(x, Tracer) for vector in (on_rack, pinion_axis, line) for x in vector.value):
             continue
         u, v = (np.asarray(vector.value, float) for vector in (on_rack, line))
         if abs(u @ v) > ACROSS * np.linalg.norm(u) * np.linalg.norm(v):
@@ -310,7 +310,7 @@ def _check_racks(racks: Mapping[str, spatial.Rolling], mechanism: Mechanism) -> 
                 "right angles to the vector, both on the first body"
             )
             raise MechanismError(message, name=f"{name}.axes", value=[float(x) for x in u])
-        rack_axis = on_joined_bodies(own, hinges, parallel, constant_attitudes(mechanism)).get(rack.bodies[0])
+        rack_axis = on_joined_bodies(pinion_axis, hinges, parallel, constant_attitudes(mechanism)).get(rack.bodies[0])
         if rack_axis is None or not _same_direction(np.asarray(rack_axis.value, float), u):
             message = (
                 "the pinion does not turn about this axis on the rack: hinge it, and guide the rack so that it keeps "

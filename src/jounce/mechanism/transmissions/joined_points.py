@@ -104,12 +104,12 @@ def body_vector(body: str, given: Any, parameters: Mapping[str, Any]) -> BodyVec
     return BodyVector(body, tuple(resolve(entry, parameters) for entry in entries), entries)
 
 
-def same_component(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[Any, Any], bool]) -> bool:
+def same_component(a: Any, b: Any, given_a: Any, given_b: Any, is_close: Callable[[Any, Any], bool]) -> bool:
     """Return whether components are the same; traced values are compared as given."""
     if isinstance(a, Tracer) or isinstance(b, Tracer):
         traced = isinstance(given_a, Tracer) or isinstance(given_b, Tracer)
         return a is b or (not traced and bool(given_a == given_b))
-    return bool(near(a, b))
+    return bool(is_close(a, b))
 
 
 def parallel(a: BodyVector, b: BodyVector) -> int:
@@ -124,7 +124,7 @@ def parallel(a: BodyVector, b: BodyVector) -> int:
 def on_joined_bodies(
     start: BodyVector,
     joined: Joined,
-    alike: Callable[[BodyVector, BodyVector], int | bool],
+    match: Callable[[BodyVector, BodyVector], int | bool],
     fixed: Sequence[tuple[Triad, Triad]] = (),
 ) -> dict[str, BodyVector]:
     """Return a point or direction on each body to which a chain of joints connects it.
@@ -135,28 +135,28 @@ def on_joined_bodies(
         The point or direction on its own body.
     joined : sequence of tuple of BodyVector
         Pairs of points or directions that joints hold together.
-    alike : callable
+    match : callable
         Returns whether two vectors of a body are the same: 1, or -1 for opposite directions.
     fixed : sequence of tuple of Triad, optional
         Pairs of bodies whose relative attitude is constant: every direction is then known on both.
     """
-    reached, waiting = {start.body: start}, [start]
-    while waiting:
-        vector = waiting.pop(0)
+    reached, pending = {start.body: start}, [start]
+    while pending:
+        vector = pending.pop(0)
         for pair in joined:
             for near, far in (pair, pair[::-1]):
                 if near.body != vector.body or far.body in reached:
                     continue
-                if sign := int(alike(vector, near)):
+                if sign := int(match(vector, near)):
                     image = far if sign > 0 else BodyVector(far.body, tuple(-x for x in far.value), far.given)
                     reached[far.body] = image
-                    waiting.append(image)
+                    pending.append(image)
         for first, second in () if any(isinstance(x, Tracer) for x in vector.value) else fixed:
             for near, far in ((first, second), (second, first)):
                 if near.body == vector.body and far.body not in reached:
                     image = far.triad.T @ (near.triad @ np.asarray(vector.value, float))
                     reached[far.body] = BodyVector(far.body, tuple(image.tolist()), tuple(image.tolist()))
-                    waiting.append(reached[far.body])
+                    pending.append(reached[far.body])
     return reached
 
 

@@ -70,21 +70,21 @@ class _Points:
 
     def bounds(self, bodies: Sequence[int], positions: Sequence[np.ndarray]) -> tuple[Bounds, Bounds]:
         """Return lower and upper bounds of the distances of given points, which come first, and stored ones, m."""
-        whole, points = np.array([*bodies, *self.bodies]), np.stack([*positions, *self.positions])
-        same = whole[:, None] == whole[None]
+        all_bodies, points = np.array([*bodies, *self.bodies]), np.stack([*positions, *self.positions])
+        same_body = all_bodies[:, None] == all_bodies[None]
         distances = np.linalg.norm(points[:, None] - points[None], axis=-1)
-        least, largest = np.where(same, distances, 0.0), np.where(same, distances, np.inf)
+        lower, upper = np.where(same_body, distances, 0.0), np.where(same_body, distances, np.inf)
         for i, j, distance in self.distances:
             pair = len(positions) + i, len(positions) + j
-            for at in (pair, pair[::-1]):
-                least[at], largest[at] = max(least[at], distance), min(largest[at], distance)
+            for entry in (pair, pair[::-1]):
+                lower[entry], upper[entry] = max(lower[entry], distance), min(upper[entry], distance)
         for k in range(len(points)):
-            largest = np.minimum(largest, largest[:, k, None] + largest[None, k])
+            upper = np.minimum(upper, upper[:, k, None] + upper[None, k])
         for k in range(len(points)):
             with np.errstate(invalid="ignore"):
-                over = np.maximum(least[:, k, None] - largest[None, k], least[None, k] - largest[:, k, None])
-            least = np.maximum(least, np.where(np.isfinite(over), over, 0.0))
-        return least, largest
+                excess = np.maximum(lower[:, k, None] - upper[None, k], lower[None, k] - upper[:, k, None])
+            lower = np.maximum(lower, np.where(np.isfinite(excess), excess, 0.0))
+        return lower, upper
 
 
 def _check(group: Any, instance: int, name: str, points: _Points) -> None:
@@ -92,12 +92,12 @@ def _check(group: Any, instance: int, name: str, points: _Points) -> None:
     slots = rope.slots or range(len(rope.points))
     bodies = [group.bodies[slot][instance] for slot in slots]
     positions, length = list(np.asarray(rope.points)[:, :, instance, 0]), float(np.asarray(rope.length)[instance, 0])
-    least, largest = points.bounds(bodies, positions)
+    lower, upper = points.bounds(bodies, positions)
     for k in range(len(positions) - 1):
-        if largest[k, k + 1] <= ROUNDING * length:
+        if upper[k, k + 1] <= ROUNDING * length:
             message = "coincides with the point before it, where the rope has no direction; leave one of them out"
             raise MechanismError(message, name=f"{name}.points", value=positions[k + 1].tolist())
-    low, high = (float(sum(bound[i, j] for i, j in pairwise(range(len(positions))))) for bound in (least, largest))
+    low, high = (float(sum(bound[i, j] for i, j in pairwise(range(len(positions))))) for bound in (lower, upper))
     if length < low * (1 - ROUNDING):
         message = (
             f"the rope is too short: along its points it is {low:.6g} m at least, wherever the bodies are; give a "
@@ -114,5 +114,5 @@ def _check(group: Any, instance: int, name: str, points: _Points) -> None:
 
 def _fixed_distance(joint: Any) -> Any:
     """Return the distance at which a joint holds its two points: zero for pins; None if it holds none."""
-    stated = facts_of(type(joint)).point_distance
-    return 0.0 if stated == "zero" else getattr(joint, stated) if stated else None
+    fact = facts_of(type(joint)).point_distance
+    return 0.0 if fact == "zero" else getattr(joint, fact) if fact else None

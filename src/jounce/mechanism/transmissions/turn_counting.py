@@ -59,13 +59,13 @@ def refined_samples(measure: Measure, path: Paths, share: Shares, angle: Angles 
     angle = measure(path, share) if angle is None else angle
     for _ in range(HALVINGS):
         fast = (np.abs(principal(np.diff(angle))) > LARGEST_CHANGE).any(axis=0)
-        wide = np.flatnonzero(fast & (path[1:] == path[:-1]))
-        if not wide.size:
+        intervals = np.flatnonzero(fast & (path[1:] == path[:-1]))
+        if not intervals.size:
             break
-        middle = 0.5 * (share[wide] + share[wide + 1])
-        inserted = measure(path[wide], middle)
-        path, share = np.insert(path, wide + 1, path[wide]), np.insert(share, wide + 1, middle)
-        angle = np.insert(angle, wide + 1, inserted, axis=1)
+        middle = 0.5 * (share[intervals] + share[intervals + 1])
+        inserted = measure(path[intervals], middle)
+        path, share = np.insert(path, intervals + 1, path[intervals]), np.insert(share, intervals + 1, middle)
+        angle = np.insert(angle, intervals + 1, inserted, axis=1)
     return PathSamples(path, share, angle)
 
 
@@ -87,10 +87,10 @@ def counted_along(
     """
     step, share = np.repeat(np.arange(len(run)), samples + 1), np.tile(np.arange(samples + 1) / samples, len(run))
     step, share, angle = refined_samples(measure, step, share)
-    begins = np.append(True, np.diff(run[step]) != 0)
-    rise = np.where(begins, 0.0, np.nan_to_num(principal(np.diff(angle, axis=1, prepend=angle[:, :1]))))
-    first = np.flatnonzero(begins)[np.cumsum(begins) - 1]  # first sample of the run of each sample
-    counted, initial_angles = np.cumsum(rise, axis=1), initial[:, step]
+    is_start = np.append(True, np.diff(run[step]) != 0)
+    rise = np.where(is_start, 0.0, np.nan_to_num(principal(np.diff(angle, axis=1, prepend=angle[:, :1]))))
+    first = np.flatnonzero(is_start)[np.cumsum(is_start) - 1]  # first sample of the run of each sample
+    total, initial_angles = np.cumsum(rise, axis=1), initial[:, step]
     return PathSamples(
-        step, share, initial_angles + principal(angle[:, first] - initial_angles) + counted - counted[:, first]
+        step, share, initial_angles + principal(angle[:, first] - initial_angles) + total - total[:, first]
     )
