@@ -64,15 +64,15 @@ def simulate_robots(
     start = start_levels(robot, state)
 
     def start_of_run(k: int) -> tuple[Robot, Any]:
-        levels, changed = [list(level) for level in start], robot
+        levels, variant = [list(level) for level in start], robot
         for name, given in values.items():
             value = given[k] if traced else float(given[k])
             joint, level = (name.removesuffix(RATE), 1) if name not in robot.joint_names else (name, 0)
             if joint in robot.joint_names:
                 levels[level][robot.joint_names.index(joint)] = value
             else:
-                changed = changed.with_inertia(name.removesuffix(MASS), mass=value)
-        return changed, levels
+                variant = variant.with_inertia(name.removesuffix(MASS), mass=value)
+        return variant, levels
 
     starts = []
     for k in range(len(next(iter(values.values())))):

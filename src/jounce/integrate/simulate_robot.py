@@ -167,8 +167,8 @@ class RobotRun(AbstractRun):
         limits: RunLimits,
         detectors: list[JointEventDetector],
     ):
-        running, none, nothing = np.asarray(int(Outcome.RUNNING)), np.asarray(0), np.zeros(1)
-        initial = Progress(np.array([limits.start]), start, running, none, none, nothing, nothing)
+        running, none, zeros = np.asarray(int(Outcome.RUNNING)), np.asarray(0), np.zeros(1)
+        initial = Progress(np.array([limits.start]), start, running, none, none, zeros, zeros)
         super().__init__(initial, limits, detectors)
         self.problem, self.names, self.tried = problem, names, 0
         self.left = ""  # the driven joint that left its law, in words
@@ -198,19 +198,19 @@ class RobotRun(AbstractRun):
         if steps is None or not self.problem.prescribed.changing:
             return steps
         starts, lengths = steps.start, steps.length
-        astray = self._departures(steps, np.repeat(np.arange(len(starts)), len(SHARES)), np.tile(SHARES, len(starts)))
-        astray, most = astray.reshape(-1, len(starts), len(SHARES)), max(ASTRAY, 100.0 * float(self.limits.tolerance))
-        left = np.abs(astray - astray[..., :1]) > most
-        if not left.any():
+        errors = self._departures(steps, np.repeat(np.arange(len(starts)), len(SHARES)), np.tile(SHARES, len(starts)))
+        errors, limit = errors.reshape(-1, len(starts), len(SHARES)), max(ASTRAY, 100.0 * float(self.limits.tolerance))
+        is_astray = np.abs(errors - errors[..., :1]) > limit
+        if not is_astray.any():
             return steps
-        step = int(np.argmax(left.any(axis=(0, 2))))
-        point = int(np.argmax(left[:, step].any(axis=0)))
-        joint, (low, high) = int(np.argmax(left[:, step, point])), SHARES[point - 1 : point + 1]
+        step = int(np.argmax(is_astray.any(axis=(0, 2))))
+        point = int(np.argmax(is_astray[:, step].any(axis=0)))
+        joint, (low, high) = int(np.argmax(is_astray[:, step, point])), SHARES[point - 1 : point + 1]
         for _ in range(ROUNDS):
-            between = low + SHARES * (high - low)
-            gap = self._departures(steps, np.full(len(SHARES), step), between)[joint] - astray[joint, step, 0]
-            point = max(int(np.argmax(np.abs(gap) > most)), 1)
-            low, high = between[point - 1 : point + 1]
+            fractions = low + SHARES * (high - low)
+            gap = self._departures(steps, np.full(len(SHARES), step), fractions)[joint] - errors[joint, step, 0]
+            point = max(int(np.argmax(np.abs(gap) > limit)), 1)
+            low, high = fractions[point - 1 : point + 1]
         instant = starts[step] + low * lengths[step]
         self.left = f"driven.{self.names[joint]}: the law or its velocity jumps at t = {instant:g} s: make it smooth"
         self.current = self.current._replace(outcome=np.asarray(int(Outcome.COLLAPSED)))
@@ -218,14 +218,14 @@ class RobotRun(AbstractRun):
         return cut._replace(length=np.append(lengths[:step], low * lengths[step]))
 
     def _departures(
-        self, steps: RobotSteps, which: Int[np.ndarray, " point"], shares: Float[np.ndarray, " point"]
+        self, steps: RobotSteps, indices: Int[np.ndarray, " point"], fractions: Float[np.ndarray, " point"]
     ) -> Float[np.ndarray, "joint point"]:
         """Return the laws of driven joints minus their coordinates at shares of steps, rad or sizes of the robot."""
-        since = shares * steps.length[which]
-        path = np.zeros((len(self.problem.scale), len(since)))
+        elapsed = fractions * steps.length[indices]
+        path = np.zeros((len(self.problem.scale), len(elapsed)))
         for coefficient in np.moveaxis(steps.polynomial.coordinates, 0, -1)[::-1]:
-            path = path * since + coefficient[:, which]
-        laws = np.asarray(self.problem.prescribed((steps.start[which] + since)[None], path, path))
+            path = path * elapsed + coefficient[:, indices]
+        laws = np.asarray(self.problem.prescribed((steps.start[indices] + elapsed)[None], path, path))
         deviation = np.asarray(self.problem.equations.driven)[:, None] * (laws - path)
         return deviation / np.asarray(self.problem.scale)[:, None]
 
@@ -242,12 +242,12 @@ class RobotRun(AbstractRun):
         if self.tried > MOST:
             return Status.COLLAPSED, f"after {self.tried} steps"
         if int(self.current.stuck) >= STUCK // 2:
-            words = (
+            fault = (
                 f"a force of a joint switches without end at t = {time:g} s, as friction of a joint that sticks does: "
                 "smooth it, as by tanh(v/v0), or leave out the drives"
             )
-            return Status.COLLAPSED, words
+            return Status.COLLAPSED, fault
         if int(self.current.outcome) == Outcome.LOST:
-            words = f"accelerations at t = {time:g} s are not finite: a force is not, or nothing resists a joint"
-            return Status.INADMISSIBLE, words
+            fault = f"accelerations at t = {time:g} s are not finite: a force is not, or nothing resists a joint"
+            return Status.INADMISSIBLE, fault
         return Status.COLLAPSED, f"at t = {time:g} s"

@@ -87,9 +87,9 @@ class Pieces(NamedTuple):
         fill = np.minimum(np.arange(power_of_two(count)), count - 1)
         return self.chosen(fill)._replace(length=np.where(np.arange(len(fill)) < count, self.length[fill], 0.0))
 
-    def chosen(self, which: Int[np.ndarray, " chosen"]) -> "Pieces":
+    def chosen(self, indices: Int[np.ndarray, " chosen"]) -> "Pieces":
         """Return the pieces with given indices."""
-        return jax.tree.map(lambda part: part[which], self)
+        return jax.tree.map(lambda part: part[indices], self)
 
     def over(self, kinks: dict[int, Break]) -> "Pieces":
         """Return the pieces with those of given indices ending at kinks.
@@ -100,22 +100,22 @@ class Pieces(NamedTuple):
         if not kinks:
             return self
         indices = np.array(sorted(kinks))
-        before, first = np.isin(np.arange(len(self.start)), indices), np.isin(np.arange(len(self.start)), indices + 1)
-        which = np.repeat(np.arange(len(self.start)), np.where(first, 1 + ROUNDS, 1))
-        back = np.append(which[1:] == which[:-1], False)
-        length, begins = self.length.copy(), self.start.copy()
+        before, after = np.isin(np.arange(len(self.start)), indices), np.isin(np.arange(len(self.start)), indices + 1)
+        repeated = np.repeat(np.arange(len(self.start)), np.where(after, 1 + ROUNDS, 1))
+        goes_back = np.append(repeated[1:] == repeated[:-1], False)
+        length, starts = self.length.copy(), self.start.copy()
         remaining, weights = np.zeros(len(length)), [np.zeros(part.shape) for part in self.state[2:]]
         for index, kink in kinks.items():
             remaining[index + 1], length[index] = length[index] - kink.since, kink.since
-            begins[index + 1] = self.start[index] + kink.since
+            starts[index + 1] = self.start[index] + kink.since
             weights[0][index + 1], weights[1][index + 1] = kink.velocity, kink.spin
-        whole = self._replace(length=length, used=self.used | (before | first)[:, None]).chosen(which)
-        over = Kinks(begins[which], back, *(part[which] for part in weights))
-        return whole._replace(length=np.where(back, -remaining[which], whole.length), kinks=over)
+        pieces = self._replace(length=length, used=self.used | (before | after)[:, None]).chosen(repeated)
+        kink_data = Kinks(starts[repeated], goes_back, *(part[repeated] for part in weights))
+        return pieces._replace(length=np.where(goes_back, -remaining[repeated], pieces.length), kinks=kink_data)
 
 
 def divided_steps(
-    dense: DenseOutput, equations: Equations, plain: Equations, allowed: float | None, kinks: Collection[Break]
+    dense: DenseOutput, equations: Equations, numeric: Equations, allowed: float | None, kinks: Collection[Break]
 ) -> Pieces:
     """Return the steps of a simulation, divided so that the series of all changes converge within each.
 
@@ -136,28 +136,28 @@ def divided_steps(
         If too many steps would be needed.
     """
     leaves, structure = jax.tree.flatten(equations)
-    numbers, plain_structure = jax.tree.flatten(plain)
+    numbers, plain_structure = jax.tree.flatten(numeric)
     assert structure == plain_structure
     moving = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
-    along, turns = _directions([numbers[k] for k in moving])
+    directions, turns = _directions([numbers[k] for k in moving])
     used, duration = _used_coefficients(dense), abs(dense.end - float(dense.start[0]))
     count = np.ones(len(dense.start), int)
     while True:
-        pieces, which = _parts(dense, used, count)
-        over = {int(np.searchsorted(which, kink.step)): kink for kink in kinks}
+        pieces, step_of_piece = _parts(dense, used, count)
+        kink_of_piece = {int(np.searchsorted(step_of_piece, kink.step)): kink for kink in kinks}
         if allowed is None:
             return pieces
-        sizes = np.stack(_sizes(plain, pieces.padded(), along, turns, moving=moving))[..., : len(pieces.start)]
-        lacking = which[_needed(sizes, pieces, duration, allowed) > 1]
-        lacking = lacking[~np.isin(lacking, [kink.step for kink in kinks])]
-        if not lacking.size:
-            return pieces.over(over)
-        if not used[lacking].all():  # a body that hardly moves took a long step of low order: try all orders first
-            used[lacking] = True
+        sizes = np.stack(_sizes(numeric, pieces.padded(), directions, turns, moving=moving))[..., : len(pieces.start)]
+        unresolved = step_of_piece[_needed(sizes, pieces, duration, allowed) > 1]
+        unresolved = unresolved[~np.isin(unresolved, [kink.step for kink in kinks])]
+        if not unresolved.size:
+            return pieces.over(kink_of_piece)
+        if not used[unresolved].all():  # a body that hardly moves took a long step of low order: try all orders first
+            used[unresolved] = True
             continue
         parts = count.copy()
-        needed = np.where(np.isin(which, lacking), _needed(sizes, pieces, duration, allowed / FINER), 1)
-        np.maximum.at(parts, which, count[which] * needed)
+        factors = np.where(np.isin(step_of_piece, unresolved), _needed(sizes, pieces, duration, allowed / FINER), 1)
+        np.maximum.at(parts, step_of_piece, count[step_of_piece] * factors)
         if parts.sum() > MOST_STEPS:
             message = (
                 f"this motion changes so fast that more than {MOST_STEPS} steps are needed; simulate a shorter time"
@@ -178,12 +178,12 @@ def _parts(
     dense: DenseOutput, used: Bool[np.ndarray, "step order"], count: Int[np.ndarray, " step"]
 ) -> tuple[Pieces, Int[np.ndarray, " part"]]:
     """Return the parts of steps, and the index of the step of each part."""
-    which = np.repeat(np.arange(len(count)), count)
+    steps = np.repeat(np.arange(len(count)), count)
     part = np.concatenate([np.arange(number) for number in count])
-    length = np.asarray(dense.length)[which] / count[which]
-    polynomial = dense.polynomial.map(lambda c: np.moveaxis(np.asarray(c)[which], (0, 1), (-1, 0)))
+    length = np.asarray(dense.length)[steps] / count[steps]
+    polynomial = dense.polynomial.map(lambda c: np.moveaxis(np.asarray(c)[steps], (0, 1), (-1, 0)))
     state = evaluated(polynomial, part * length).map(lambda x: np.moveaxis(np.asarray(x), -1, 0))
-    return Pieces(np.asarray(dense.start)[which] + part * length, length, state, used[which]), which
+    return Pieces(np.asarray(dense.start)[steps] + part * length, length, state, used[steps]), steps
 
 
 def _needed(
@@ -197,15 +197,15 @@ def _needed(
     """
     positions, velocities = sizes
     orders = np.arange(len(positions))[:, None, None]
-    beyond, whole = ~pieces.used.T[:, None], pieces.used.all(axis=1)
+    unused, complete = ~pieces.used.T[:, None], pieces.used.all(axis=1)
     counts = np.full(len(pieces.length), 2**HALVINGS)
     for parts in 2 ** np.arange(HALVINGS)[::-1]:
         powers = (np.abs(pieces.length) / parts) ** orders
         terms = positions * powers
         largest = np.maximum(terms, duration * velocities * powers).max(axis=0)
         last, before = terms[-2:].max(axis=0), terms[-4:-2].max(axis=0)
-        following = last * np.minimum(last / np.maximum(before, 1e-300), 1.0)
-        left_out = np.where(whole, following, np.where(beyond, terms, 0.0).max(axis=0))
+        next_term = last * np.minimum(last / np.maximum(before, 1e-300), 1.0)
+        left_out = np.where(complete, next_term, np.where(unused, terms, 0.0).max(axis=0))
         counts[(left_out <= allowed * largest).all(axis=0)] = parts
     return counts
 
@@ -217,9 +217,9 @@ def _directions(numbers: Sequence[Any]) -> tuple[list[np.ndarray], np.ndarray]:
     """
     random = np.random.default_rng(0)
     count = min(len(numbers), MOST_DIRECTIONS)
-    chosen = np.eye(count + 1)[:, np.arange(len(numbers)) % max(count, 1)]
+    assignment = np.eye(count + 1)[:, np.arange(len(numbers)) % max(count, 1)]
     return [
-        random.normal(size=np.shape(x)) * chosen[:, k].reshape(-1, *[1] * np.ndim(x)) for k, x in enumerate(numbers)
+        random.normal(size=np.shape(x)) * assignment[:, k].reshape(-1, *[1] * np.ndim(x)) for k, x in enumerate(numbers)
     ], np.eye(count + 1)[count]
 
 
@@ -227,7 +227,7 @@ def _directions(numbers: Sequence[Any]) -> tuple[list[np.ndarray], np.ndarray]:
 def _sizes(
     equations: Equations,
     pieces: Pieces,
-    along: list[Numbers],
+    directions: list[Numbers],
     turns: Float[Numbers, " direction"],
     *,
     moving: tuple[int, ...],
@@ -238,21 +238,21 @@ def _sizes(
     state = pieces.state.map(lambda part: jnp.moveaxis(part, 0, -1))
 
     def series(numbers: Any, state: State) -> Any:
-        whole = list(leaves)
+        all_leaves = list(leaves)
         for k, number in zip(moving, numbers, strict=True):
-            whole[k] = number
-        expansion = series_through(jax.tree.unflatten(structure, whole), state, pieces.start[None], order)
+            all_leaves[k] = number
+        expansion = series_through(jax.tree.unflatten(structure, all_leaves), state, pieces.start[None], order)
         scaled = expansion._replace(position=expansion.position / length, velocity=expansion.velocity / length)
         flat = scaled.map(lambda part: part.reshape(order + 1, -1, len(pieces.start)))
         return jnp.concatenate(flat[:2], axis=1), jnp.concatenate(flat[2:], axis=1)
 
-    def change(along: Any, turn: Any) -> Any:
-        moved = jax.tree.map(lambda x: turn * jnp.ones_like(x), state)
+    def change(directions: Any, turn: Any) -> Any:
+        state_change = jax.tree.map(lambda x: turn * jnp.ones_like(x), state)
         numbers = [jnp.asarray(leaves[k], float) for k in moving]
-        changes = jax.jvp(series, (numbers, state), (along, moved))[1]
+        changes = jax.jvp(series, (numbers, state), (directions, state_change))[1]
         return tuple(jnp.max(jnp.abs(x), axis=1) for x in changes)
 
-    return jax.vmap(change, out_axes=1)(along, turns)
+    return jax.vmap(change, out_axes=1)(directions, turns)
 
 
 def series_through(equations: Equations, state: State, time: Instants, order: int) -> State:
@@ -261,7 +261,7 @@ def series_through(equations: Equations, state: State, time: Instants, order: in
     return expand(equations, state, time, order, DenseInverse(inverse), reversible=True).state
 
 
-def _inverse(matrix: Any, known: Any) -> Any:
+def _inverse(matrix: Any, inverse: Any) -> Any:
     """Return the known inverse of matrices, with its derivatives.
 
     It is written as a linear solve: with a rule by `jax.custom_jvp`, derivatives of gradients were wrong, since JAX
@@ -272,5 +272,5 @@ def _inverse(matrix: Any, known: Any) -> Any:
         return jnp.sum(a[:, :, None] * b[None], axis=1)
 
     unit = jnp.broadcast_to(jnp.eye(len(matrix))[:, :, None], matrix.shape)
-    transposed = jnp.swapaxes(known, 0, 1)
-    return solver(partial(product, matrix), partial(product, known), partial(product, transposed))(unit)
+    transposed = jnp.swapaxes(inverse, 0, 1)
+    return solver(partial(product, matrix), partial(product, inverse), partial(product, transposed))(unit)

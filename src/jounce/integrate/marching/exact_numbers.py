@@ -96,9 +96,9 @@ def _are_parallel(rotations: bytes, turning: bytes, ancestors: bytes) -> bool:
     axes, directions = [], set()
     for k in range(count):
         parents = np.flatnonzero(moves[k, :k])
-        own = may_differ[k] if not parents.size else axes[parents[-1]] @ may_differ[k]
+        rotation = may_differ[k] if not parents.size else axes[parents[-1]] @ may_differ[k]
         if turning[k] != ZERO:
-            directions.add(tuple(own[:, 2].tolist()))
-            own = own @ OF_TURN
-        axes.append(own)
+            directions.add(tuple(rotation[:, 2].tolist()))
+            rotation = rotation @ OF_TURN
+        axes.append(rotation)
     return len(directions) == 1 and sum(*directions) == 1

@@ -27,7 +27,7 @@ class Kinked(NamedTuple):
     late: Any
 
 
-def refined_kink_state(state: State, series: State, length: Any, kinked: Kinked, over: Kinks) -> tuple[State, Any]:
+def refined_kink_state(state: State, series: State, length: Any, kinked: Kinked, kink: Kinks) -> tuple[State, Any]:
     """Return refined values of the state behind a kink, and of the variation of the instant of the kink.
 
     The series through the state, continued back to the kink, meets the series from before the kink.
@@ -40,20 +40,20 @@ def refined_kink_state(state: State, series: State, length: Any, kinked: Kinked,
         Time from the state to the kink, s.
     kinked : Kinked
         The motion before the kink.
-    over : Kinks
+    kink : Kinks
         The kink of this piece.
     """
 
-    def rates(series: State, since: Any) -> State:
+    def rates(series: State, elapsed: Any) -> State:
         orders = jnp.arange(1.0, len(series.position))[:, None, None, None]
-        return evaluated(series.map(lambda part: part[1:] * orders), since)
+        return evaluated(series.map(lambda part: part[1:] * orders), elapsed)
 
     before, after = rates(kinked.series, kinked.late), rates(series, length + kinked.late)
-    gap = jnp.sum(over.velocity[..., None] * (before.velocity - after.velocity), axis=(0, 1))
-    gap += jnp.sum(over.spin[..., None] * (before.spin - after.spin), axis=(0, 1))
-    late = with_value(kinked.late - gap, 0.0)
-    before, after = evaluated(kinked.series, late), evaluated(series, length + late)
-    return jax.tree.map(lambda x, a, b: x + a - b, state, before, after), late
+    gap = jnp.sum(kink.velocity[..., None] * (before.velocity - after.velocity), axis=(0, 1))
+    gap += jnp.sum(kink.spin[..., None] * (before.spin - after.spin), axis=(0, 1))
+    delay = with_value(kinked.late - gap, 0.0)
+    before, after = evaluated(kinked.series, delay), evaluated(series, length + delay)
+    return jax.tree.map(lambda x, a, b: x + a - b, state, before, after), delay
 
 
 def with_value(x: Any, value: Any) -> Any:

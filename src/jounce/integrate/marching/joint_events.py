@@ -80,14 +80,14 @@ class JointEventDetector(AbstractDetector):
 
     def _values(self, steps: RobotSteps) -> np.ndarray:
         """Return the quantity at the nodes of steps, (steps, nodes)."""
-        since = steps.length[:, None] * NODES
+        elapsed = steps.length[:, None] * NODES
         derivative = self.event.derivative
         if isinstance(self.event.of, str):
-            of = np.asarray(steps.polynomial.coordinates)[:, :, self._names.index(self.event.of)]
-            return _at(of, since, derivative)
+            series = np.asarray(steps.polynomial.coordinates)[:, :, self._names.index(self.event.of)]
+            return _at(series, elapsed, derivative)
         parts = [np.moveaxis(np.asarray(part), -1, 0) for part in steps.polynomial[:2]]
-        q, rates = (np.stack([_at(x, since, 0) for x in part], axis=-1) for part in parts)
-        time = steps.start[:, None] + since
+        q, rates = (np.stack([_at(x, elapsed, 0) for x in part], axis=-1) for part in parts)
+        time = steps.start[:, None] + elapsed
         n = len(self._names)
         given = time.ravel(), q.reshape(-1, n).T, rates.reshape(-1, n).T
 
@@ -109,6 +109,6 @@ def _at_samples(function: SampleFunction | None, time: Any, q: Any, rates: Any) 
     return function(time, q, rates)
 
 
-def _at(coefficients: np.ndarray, since: np.ndarray, derivative: int) -> np.ndarray:
+def _at(coefficients: np.ndarray, elapsed: np.ndarray, derivative: int) -> np.ndarray:
     """Return the values of a derivative of polynomials, (steps, order + 1), at times from their beginnings."""
-    return np.asarray(polyval(since, polyder(coefficients.T, derivative)[..., None], tensor=False))
+    return np.asarray(polyval(elapsed, polyder(coefficients.T, derivative)[..., None], tensor=False))

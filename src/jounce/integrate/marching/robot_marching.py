@@ -83,8 +83,8 @@ class RobotProblem(Module):
 
     def applied(self, motion: TreeState, time: Float[Numbers, "1 batch"]) -> tuple[Unknowns, tuple[Any, ...]]:
         """Return the joint forces and wrenches in a state; the forces of driven joints are zero, as they follow."""
-        free = 1.0 - jnp.asarray(self.equations.driven)[:, None]
-        forces = free * self.forces(time, motion.coordinates, motion.rates)
+        mask = 1.0 - jnp.asarray(self.equations.driven)[:, None]
+        forces = mask * self.forces(time, motion.coordinates, motion.rates)
         pushes = self.wrenches(time[0], motion.coordinates, motion.rates)
         return Unknowns(forces, None if motion.base is None else jnp.zeros_like(motion.base.twist)), pushes
 
@@ -112,14 +112,14 @@ class RobotProblem(Module):
         """Return the entries that stay constant in any motion, given only the exact numbers; None if that fails."""
         from jounce.execution.llvm.certain_numbers import certain_numbers
 
-        known = with_fields(forms_of(self), equations=exact.known(self.equations))
+        base = with_fields(forms_of(self), equations=exact.known(self.equations))
         state, time = RobotState(*[np.full((len(self.scale), 1), np.nan)] * 2), np.full((1, 1), np.nan)
-        program, form = jax.make_jaxpr(RobotProblem.motion, return_shape=True)(known, state)
+        program, form = jax.make_jaxpr(RobotProblem.motion, return_shape=True)(base, state)
         try:
-            now = certain_numbers(program, jax.tree.leaves((known, state)))
-            motion = jax.tree.unflatten(jax.tree.structure(form), now)
+            values = certain_numbers(program, jax.tree.leaves((base, state)))
+            motion = jax.tree.unflatten(jax.tree.structure(form), values)
             trial = Unknowns(state.rates, None)
-            return constant_motion(lambda problem: (problem.equations, problem.applied), known, motion, trial, time)
+            return constant_motion(lambda problem: (problem.equations, problem.applied), base, motion, trial, time)
         except UnsupportedOperationError:
             return None
 
@@ -205,16 +205,16 @@ class Progress(NamedTuple):
     longest: Lanes  # longest step so far, s
 
 
-def _departures(problem: RobotProblem, polynomial: RobotState, time: Any, since: Any, *, one_by_one: bool) -> Any:
+def _departures(problem: RobotProblem, polynomial: RobotState, time: Any, elapsed: Any, *, one_by_one: bool) -> Any:
     """Return `RobotProblem.departures` at points of a step, all at once or one after another."""
 
-    def at_points(since: Any) -> Any:
-        state, rates = at(polynomial, since), rates_at(polynomial, since)
-        return problem.departures(state, rates, (time + since)[None])
+    def at_points(elapsed: Any) -> Any:
+        state, rates = at(polynomial, elapsed), rates_at(polynomial, elapsed)
+        return problem.departures(state, rates, (time + elapsed)[None])
 
     if not one_by_one:
-        return at_points(since)
-    return [jnp.moveaxis(x[..., 0], 0, -1) for x in jax.lax.map(at_points, since[:, None])]
+        return at_points(elapsed)
+    return [jnp.moveaxis(x[..., 0], 0, -1) for x in jax.lax.map(at_points, elapsed[:, None])]
 
 
 def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
@@ -225,11 +225,11 @@ def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
     sizes = jnp.max(jnp.abs(polynomial.rates) / scale, axis=1, initial=0.0) / numbers
     if polynomial.position is None:
         return sizes
-    moved = jnp.max(jnp.abs(polynomial.position[1:]), axis=1) / problem.length
-    turned = 2.0 * jnp.max(jnp.abs(polynomial.quaternion[1:]), axis=1)
+    translation = jnp.max(jnp.abs(polynomial.position[1:]), axis=1) / problem.length
+    rotation = 2.0 * jnp.max(jnp.abs(polynomial.quaternion[1:]), axis=1)
     twist = jnp.max(jnp.abs(polynomial.twist[:, 3:]), axis=1) / numbers
     sizes = jnp.maximum(sizes, twist)
-    return jnp.concatenate([jnp.maximum(sizes[:-1], jnp.maximum(moved, turned)), sizes[-1:]])
+    return jnp.concatenate([jnp.maximum(sizes[:-1], jnp.maximum(translation, rotation)), sizes[-1:]])
 
 
 @compiled("order", "count", "exact", otherwise={"exact": None})
@@ -281,9 +281,9 @@ def march_robot(
         A wrong velocity acts until the end of the run, so jumps count by the displacement until then. The residual at
         the beginning, where the series satisfies the equations, is rounding.
         """
-        shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, points + 1)) / _point_count(step)])
-        since = jnp.minimum(shares, 1.0) * step
-        gap, size = _departures(problem, polynomial, time, since, one_by_one=one_by_one)
+        fractions = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, points + 1)) / _point_count(step)])
+        elapsed = jnp.minimum(fractions, 1.0) * step
+        gap, size = _departures(problem, polynomial, time, elapsed, one_by_one=one_by_one)
         rounding = NOISE * jnp.max(jnp.abs(gap[:, 0])) + ROUNDING * jnp.max(jnp.abs(size))
         largest = jnp.maximum(jnp.max(jnp.abs(gap[:, 1:])) - rounding, 0.0)
         local = largest * step**2 / (order * (order + 1.0)) / (MARGIN * tolerance)
@@ -302,8 +302,8 @@ def march_robot(
 
         def further(carry: Any) -> Any:
             first, error, finite = carry
-            crossed, fine = look(polynomial, time, step, first, usual)
-            return first + points, jnp.maximum(error, crossed), finite & fine
+            crossed, is_finite = look(polynomial, time, step, first, usual)
+            return first + points, jnp.maximum(error, crossed), finite & is_finite
 
         def open_(carry: Any) -> Any:
             first, error, finite = carry
@@ -313,55 +313,55 @@ def march_robot(
         return finite & (error <= 1.0), finite, (error > 0.0) & (jnp.abs(step) <= SHORTEST * duration)
 
     def attempt(current: Progress) -> tuple[Progress, tuple[RobotSteps, Any]]:
-        time, left = current.time, stop - current.time[0] - current.rest[0]
-        whole = polynomial_of(problem.series(current.state, time[None], order, still=still))
-        sizes = _sizes(problem, whole)
-        known = jnp.all(jnp.isfinite(sizes[:NEEDED]))
+        time, remaining = current.time, stop - current.time[0] - current.rest[0]
+        full_series = polynomial_of(problem.series(current.state, time[None], order, still=still))
+        sizes = _sizes(problem, full_series)
+        defined = jnp.all(jnp.isfinite(sizes[:NEEDED]))
         sizes = jnp.where(jnp.isfinite(sizes), sizes, jnp.inf)
         # beside a jump the upper terms are growing rounding: steps that these shorten would never leave the jump
-        least, lasting = (HARMLESS, duration) if problem.smooth else (0.0, None)
-        allowed = jnp.full(time.shape, jnp.maximum(tolerance, least))
+        bound, lasting = (HARMLESS, duration) if problem.smooth else (0.0, None)
+        allowed = jnp.full(time.shape, jnp.maximum(tolerance, bound))
         used, reach = furthest(sizes, allowed, UNUSUAL * current.longest, lasting)
-        polynomial = jax.tree.map(lambda c: jnp.where(used[: len(c), None], c, 0.0), whole)
-        step = jnp.minimum(jnp.minimum(reach[0], longest), jnp.abs(left))
-        step = jnp.where(step >= 0.999 * jnp.abs(left), jnp.abs(left), step)
-        shortest, wished = finest(duration, time, current.crossing)[0], step
-        direction, usual = jnp.sign(left), jnp.maximum(current.longest[0], step)
+        polynomial = jax.tree.map(lambda c: jnp.where(used[: len(c), None], c, 0.0), full_series)
+        step = jnp.minimum(jnp.minimum(reach[0], longest), jnp.abs(remaining))
+        step = jnp.where(step >= 0.999 * jnp.abs(remaining), jnp.abs(remaining), step)
+        shortest, planned = finest(duration, time, current.crossing)[0], step
+        direction, usual = jnp.sign(remaining), jnp.maximum(current.longest[0], step)
 
         def narrowed(carry: Any) -> Any:
-            low, high, over = carry
+            low, high, jumps = carry
             step = jnp.where(low > 0, 0.5 * (low + high), 0.5 * high)
-            good, finite, jump = fits(polynomial, time[0], direction * step, usual)
-            taken = good | ((step <= shortest) & finite)
-            return jnp.where(taken, step, low), jnp.where(taken, high, step), jnp.where(taken, jump, over)
+            accepted, finite, jump = fits(polynomial, time[0], direction * step, usual)
+            is_taken = accepted | ((step <= shortest) & finite)
+            return jnp.where(is_taken, step, low), jnp.where(is_taken, high, step), jnp.where(is_taken, jump, jumps)
 
         def open_(carry: Any) -> Any:
             low, high, _ = carry
-            nearer = (high - low > NEAR * low) & (low < STEEP * usual)  # to a jump; steep forces need none
-            return jnp.where(low > 0, (low < high) & nearer, high > 0.25 * shortest)
+            narrowing = (high - low > NEAR * low) & (low < STEEP * usual)  # to a jump; steep forces need none
+            return jnp.where(low > 0, (low < high) & narrowing, high > 0.25 * shortest)
 
-        good, _, over = fits(polynomial, time[0], direction * step, usual)
-        low, _, over = jax.lax.while_loop(open_, narrowed, (jnp.where(good, step, 0.0), step, over))
+        accepted, _, jumps = fits(polynomial, time[0], direction * step, usual)
+        low, _, jumps = jax.lax.while_loop(open_, narrowed, (jnp.where(accepted, step, 0.0), step, jumps))
         step = jnp.where(low > 0, low, shortest)
-        last = step >= jnp.abs(left)
+        last = step >= jnp.abs(remaining)
         arrived = at(polynomial, direction * step[None])
-        since = direction * step + current.rest[0]
-        time_after = jnp.where(last, stop, time[0] + since)
-        rest = jnp.where(last, 0.0, since - (time_after - time[0]))
-        short = (step < SHORT * wished) & ~last
+        elapsed = direction * step + current.rest[0]
+        time_after = jnp.where(last, stop, time[0] + elapsed)
+        rest = jnp.where(last, 0.0, elapsed - (time_after - time[0]))
+        short = (step < SHORT * planned) & ~last
         stuck = steps_counted(current.stuck, step, duration, longest=STUCK_STEP)
-        moves = known & (low > 0) & (stuck < STUCK)
+        moves = defined & (low > 0) & (stuck < STUCK)
         # the value at the very end of a step over a jump is not finite
-        again = known & (low == 0.0) & (stuck < STUCK) & (current.crossing < AGAIN)
+        retry = defined & (low == 0.0) & (stuck < STUCK) & (current.crossing < AGAIN)
         outcome = jnp.where(last, int(Outcome.ARRIVED), int(Outcome.RUNNING))
-        failed = jnp.where(again, int(Outcome.RUNNING), jnp.where(known, int(Outcome.COLLAPSED), int(Outcome.LOST)))
+        failed = jnp.where(retry, int(Outcome.RUNNING), jnp.where(defined, int(Outcome.COLLAPSED), int(Outcome.LOST)))
         outcome = jnp.where(moves, outcome, failed)
-        crossing = steps_counted(current.crossing, step, duration, over | (low == 0.0))
+        crossing = steps_counted(current.crossing, step, duration, jumps | (low == 0.0))
         longest_so_far = jnp.maximum(current.longest, step)
         after = Progress(time_after[None], arrived, outcome, stuck, crossing, rest[None], longest_so_far)
-        steps = RobotSteps(time, direction * step[None], polynomial, (short | over)[None])
-        stay = current._replace(outcome=outcome, crossing=crossing)
-        return jax.tree.map(lambda a, b: jnp.where(moves, a, b), after, stay), (steps, moves[None])
+        steps = RobotSteps(time, direction * step[None], polynomial, (short | jumps)[None])
+        unmoved = current._replace(outcome=outcome, crossing=crossing)
+        return jax.tree.map(lambda a, b: jnp.where(moves, a, b), after, unmoved), (steps, moves[None])
 
     flags, numbers = jnp.zeros((count, 1), bool), jnp.zeros((count, 1))
     polynomial = jax.tree.map(lambda x: jnp.zeros((count, order + 2, *x.shape)), current.state)

@@ -43,8 +43,8 @@ def start_levels(robot: Robot, state: Any) -> Any:
     """
     names = robot.joint_names
     if isinstance(state, Mapping):
-        known = {name: 0.0 if is_traced(x) else x for name, x in state.items()}
-        q = robot.coordinates(**known)  # checks the names and values
+        numbers = {name: 0.0 if is_traced(x) else x for name, x in state.items()}
+        q = robot.coordinates(**numbers)  # checks the names and values
         state = [[state.get(name, x) for name, x in zip(names, q, strict=True)], np.zeros(len(names))]
     shape = 2, len(names)
     if is_traced(state):
@@ -60,30 +60,30 @@ def polynomial_of(series: MotionSeries) -> RobotState:
     return RobotState(series.coordinates, series.rates, series.position, series.quaternion, series.twist)
 
 
-def at(polynomial: RobotState, since: Lanes) -> RobotState:
+def at(polynomial: RobotState, elapsed: Lanes) -> RobotState:
     """Return the values of polynomials, with a normalized quaternion, at times from their beginnings."""
-    state = jax.tree.map(lambda c: _value(c, since), polynomial)
+    state = jax.tree.map(lambda c: _value(c, elapsed), polynomial)
     if state.quaternion is None:
         return state
     return state._replace(quaternion=state.quaternion / jnp.sqrt(jnp.sum(state.quaternion**2, axis=0, keepdims=True)))
 
 
-def rates_at(polynomial: RobotState, since: Lanes) -> RobotState:
+def rates_at(polynomial: RobotState, elapsed: Lanes) -> RobotState:
     """Return the values of the derivatives of polynomials."""
 
     def rate(c: Any) -> Any:
-        return _value(c[1:] * jnp.arange(1.0, len(c))[:, None, None], since)
+        return _value(c[1:] * jnp.arange(1.0, len(c))[:, None, None], elapsed)
 
     return jax.tree.map(rate, polynomial)
 
 
-def _value(coefficients: Any, since: Any) -> Any:
+def _value(coefficients: Any, elapsed: Any) -> Any:
     """Return values of polynomials by a loop over the orders, which keeps the compiled code small."""
     count = len(coefficients)
-    shape = (coefficients.shape[1], jnp.broadcast_shapes(coefficients.shape[2:], since.shape)[0])
+    shape = (coefficients.shape[1], jnp.broadcast_shapes(coefficients.shape[2:], elapsed.shape)[0])
 
     def added(k: Any, value: Any) -> Any:
         c = jax.lax.dynamic_index_in_dim(coefficients, count - 1 - k, 0, keepdims=False)
-        return value * since[None] + c
+        return value * elapsed[None] + c
 
     return jax.lax.fori_loop(0, count, added, jnp.zeros(shape))

@@ -74,8 +74,8 @@ class AbstractRun(abc.ABC):
             if (part := self._march()) is not None:
                 self.parts.append(self._until_stopped(part))
             if progress is not None:
-                passed = self.direction * instants <= self.direction * self.current.time.item()
-                progress(int(np.sum(passed)), len(instants))
+                is_passed = self.direction * instants <= self.direction * self.current.time.item()
+                progress(int(np.sum(is_passed)), len(instants))
         if not self.parts:
             self.parts.append(self.initial_step())
         if self.current.outcome.item() in FAILED and self.stopped_at is None:
@@ -95,14 +95,14 @@ class AbstractRun(abc.ABC):
     def _until_stopped(self, part: Any) -> Any:
         """Record the events in some steps, and return the steps up to the first terminal event, the last one cut."""
         events = [
-            (step, after, which)
-            for which, detector in enumerate(self.detectors)
+            (step, after, index)
+            for index, detector in enumerate(self.detectors)
             for step, after in detector.detect(part)
         ]
-        for step, after, which in sorted(events, key=lambda x: (x[0], abs(x[1]))):
+        for step, after, index in sorted(events, key=lambda x: (x[0], abs(x[1]))):
             instant = float(part.start[step] + after)
-            self.happened[which].append(instant)
-            if self.detectors[which].event.terminal:
+            self.happened[index].append(instant)
+            if self.detectors[index].event.terminal:
                 self.stopped_at = instant
                 cut = jax.tree.map(lambda x, count=step + 1: x[:count], part)
                 return cut._replace(length=np.append(part.length[:step], after))

@@ -68,12 +68,12 @@ def breaks(dense: DenseOutput, length: float) -> list[Break]:
         return []
     largest = [float(np.nanmax(np.abs(series[:, k]), initial=0.0)) for k in range(3)]
     for step in np.flatnonzero((dense.kink[:-1] >= 0) | _jerk_jumps(series, dense.length, largest[2])).tolist():
-        over, noted = float(dense.length[step]), bool(dense.kink[step] >= 0)
-        order, since, weight = _between(series[step], series[step + 1], over, noted, largest)
+        span, noted = float(dense.length[step]), bool(dense.kink[step] >= 0)
+        order, time, weight = _between(series[step], series[step + 1], span, noted, largest)
         if order:
             weights = weight[: parts[0].shape[2]] / length, weight[parts[0].shape[2] :]
             shaped = (w.reshape(part.shape[2:]) for w, part in zip(weights, (velocity, spin), strict=True))
-            breaks_found.append(Break(step, order, since, *shaped))
+            breaks_found.append(Break(step, order, time, *shaped))
     return breaks_found
 
 
@@ -89,7 +89,7 @@ def _jerk_jumps(
 
 
 def _between(
-    before: Terms, after: Terms, over: float, noted: bool, largest: list[float]
+    before: Terms, after: Terms, span: float, noted: bool, largest: list[float]
 ) -> tuple[int, float, Float[np.ndarray, " part"]]:
     """Return the lowest derivative that jumps from one step to the next or 0, its time, and the weights of a kink.
 
@@ -97,55 +97,55 @@ def _between(
     coefficients in the whole run.
     """
     none = np.zeros(before.shape[1])
-    if not (over and np.isfinite(before).all() and np.isfinite(after).all()):
-        return 0, over, none
+    if not (span and np.isfinite(before).all() and np.isfinite(after).all()):
+        return 0, span, none
 
-    def gap(since: float, level: int) -> Float[np.ndarray, " part"]:
-        return _derivative(before, since, level) - _derivative(after, since - over, level)
+    def gap(time: float, level: int) -> Float[np.ndarray, " part"]:
+        return _derivative(before, time, level) - _derivative(after, time - span, level)
 
     def stays(level: int) -> bool:
         """Return whether the difference is constant along the step, as at a jump but not at the foot of a pulse."""
-        last_gap = gap(over, level)
+        last_gap = gap(span, level)
         return bool(np.abs(gap(0.0, level) - last_gap).max() <= ALIKE * np.abs(last_gap).max())
 
-    def differ(level: int, least: float) -> bool:
-        return bool(np.abs(gap(over, level)).max() > least + BEYOND * _left_out(before, over, level))
+    def differ(level: int, bound: float) -> bool:
+        return bool(np.abs(gap(span, level)).max() > bound + BEYOND * _left_out(before, span, level))
 
-    sizes = [max(np.abs(_derivative(before, over, k)).max(), np.abs(after[k]).max() * k) for k in range(3)]
+    sizes = [max(np.abs(_derivative(before, span, k)).max(), np.abs(after[k]).max() * k) for k in range(3)]
     if noted and differ(0, FAINT * largest[0] + SLIGHT) and stays(0):
-        return 1, over, none
+        return 1, span, none
     for order in (3, 4):
-        bend = gap(over, order - 1)
+        bend = gap(span, order - 1)
         square = max(float(bend @ bend), 1e-300)
-        since = over
+        time = span
         for _ in range(ROUNDS):
-            since -= float(gap(since, order - 2) @ bend) / square
-            since = min(max(since / over, -1.0), 2.0) * over
+            time -= float(gap(time, order - 2) @ bend) / square
+            time = min(max(time / span, -1.0), 2.0) * span
         size = math.sqrt(square)
-        rest = ASIDE * size * abs(over) + BEYOND * SLIGHT * sizes[1]
-        aside = ASIDE if noted else SLIGHT
-        low = -aside if noted else 1.0 - aside  # an unnoted kink can only be between steps
-        within = low <= since / over <= 1.0 + aside and np.abs(gap(since, order - 2)).max() <= rest
-        within = within and np.abs(gap(since, order - 1) - bend).max() <= ALIKE * size
-        plain = size * abs(over) > SLIGHT * largest[1] and differ(2, FAINT * sizes[2] if noted else PLAIN * largest[2])
-        if order == 3 and within and plain:
-            since = min(max(since / over, 0.0), 1.0) * over
-            bend = gap(since, 2)
-            return 3, since, bend / float(bend @ bend)
-        if within and np.abs(gap(since, 1)).max() <= ASIDE * size * abs(over) ** (order - 2) + SLIGHT * largest[1]:
-            return 0, over, none
-    return (2, over, none) if noted and differ(1, FAINT * largest[1]) and stays(1) else (0, over, none)
+        limit = ASIDE * size * abs(span) + BEYOND * SLIGHT * sizes[1]
+        margin = ASIDE if noted else SLIGHT
+        low = -margin if noted else 1.0 - margin  # an unnoted kink can only be between steps
+        inside = low <= time / span <= 1.0 + margin and np.abs(gap(time, order - 2)).max() <= limit
+        inside = inside and np.abs(gap(time, order - 1) - bend).max() <= ALIKE * size
+        sharp = size * abs(span) > SLIGHT * largest[1] and differ(2, FAINT * sizes[2] if noted else PLAIN * largest[2])
+        if order == 3 and inside and sharp:
+            time = min(max(time / span, 0.0), 1.0) * span
+            bend = gap(time, 2)
+            return 3, time, bend / float(bend @ bend)
+        if inside and np.abs(gap(time, 1)).max() <= ASIDE * size * abs(span) ** (order - 2) + SLIGHT * largest[1]:
+            return 0, span, none
+    return (2, span, none) if noted and differ(1, FAINT * largest[1]) and stays(1) else (0, span, none)
 
 
-def _left_out(series: Terms, since: float, level: int) -> float:
+def _left_out(series: Terms, time: float, level: int) -> float:
     """Return the size of the last terms of a derivative of a series, as an estimate of the truncation error."""
     orders = np.flatnonzero(np.abs(series).max(axis=1))[-LAST:]
     orders = orders[orders >= max(level, len(series) // 2)]
     factors = np.array([math.perm(int(k), level) for k in orders], float)
-    terms = factors * abs(since) ** (orders - level).astype(float) * np.abs(series[orders]).max(axis=1)
+    terms = factors * abs(time) ** (orders - level).astype(float) * np.abs(series[orders]).max(axis=1)
     return float(terms.max(initial=0.0))
 
 
-def _derivative(series: Terms, since: float, level: int) -> Float[np.ndarray, " part"]:
+def _derivative(series: Terms, time: float, level: int) -> Float[np.ndarray, " part"]:
     """Return a derivative of series at a time from their beginning."""
-    return np.asarray(polyval(since, polyder(series, level)))
+    return np.asarray(polyval(time, polyder(series, level)))

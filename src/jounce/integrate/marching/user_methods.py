@@ -49,16 +49,16 @@ def integrator(method: AbstractMethod, equations: Equations, current: Integrator
         return method
     leaves, tree = jax.tree.flatten((method, equations, current))
 
-    def whole(*given: Any) -> Any:
+    def one_step(*given: Any) -> Any:
         method, equations, current = jax.tree.unflatten(tree, given)
         step, length = jnp.ones(current.time.shape), equations.system.column_scale[0]
         start, *prepared = method.prepared(current.expansion, length, jnp.ones(()), current.singular, step)
-        arrived = method.arrive(equations, start, current.time, step)
+        end_state = method.arrive(equations, start, current.time, step)
         ends = method.polynomial(start, current.expansion, step), method.error(start, current.expansion, step, length)
-        return jax.tree.leaves((start, prepared, arrived, ends))
+        return jax.tree.leaves((start, prepared, end_state, ends))
 
     try:
-        key = value_key(captured_function(whole, *leaves).traced)
+        key = value_key(captured_function(one_step, *leaves).traced)
     except Exception:  # noqa: BLE001 - the call raises the error again
         key = (OpaqueObject(object()),)
     return ReadIntegrator(method, (*key, method.controlled))

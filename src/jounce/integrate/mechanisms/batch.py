@@ -137,8 +137,8 @@ def simulate_batch(
 
     starts = BatchStart(parametric, with_conditions, nominal.state, rows, float(instants[0]))
 
-    def start_runs(some: np.ndarray) -> None:
-        runs.start_runs(some, *starts.of(some))
+    def start_runs(indices: np.ndarray) -> None:
+        runs.start_runs(indices, *starts.of(indices))
 
     first_chunk, *others = runs.chunks(np.arange(len(rows)))
     start_runs(first_chunk)  # allocates the arrays for all runs
@@ -181,7 +181,7 @@ class _Runs:
         self._begun = np.full(len(rows), instants[0])  # start of the last step
         self._angles: dict[int, np.ndarray] = {}  # series of turning outputs at that time
         outputs = parametric.model.system.outputs
-        self._measuring = [which for which, group in enumerate(outputs) if measures_angle(group)]
+        self._measuring = [index for index, group in enumerate(outputs) if measures_angle(group)]
         self._turns: dict[int, np.ndarray] = {}  # angles about axes at the end of the last step, (instances, runs)
 
     @property
@@ -206,10 +206,10 @@ class _Runs:
     def outputs(self) -> dict[str, np.ndarray]:
         """See `Batch`."""
         values_by_name = {}
-        for which, values in self._values.items():
-            for k, name in enumerate(self.parametric.model.outputs[which]):
-                plain = np.moveaxis(np.asarray(plain_derivatives(np.moveaxis(values[..., k], 2, 0))), 0, 2)
-                values_by_name[name] = plain[..., 0] if plain.shape[-1] == 1 else plain
+        for index, values in self._values.items():
+            for k, name in enumerate(self.parametric.model.outputs[index]):
+                derivatives = np.moveaxis(np.asarray(plain_derivatives(np.moveaxis(values[..., k], 2, 0))), 0, 2)
+                values_by_name[name] = derivatives[..., 0] if derivatives.shape[-1] == 1 else derivatives
         return {name: values_by_name[name] for name in self.parametric.mechanism.outputs if name in values_by_name}
 
     def chunks(self, runs: np.ndarray) -> list[np.ndarray]:
@@ -223,45 +223,45 @@ class _Runs:
         current, first_angles = jax.tree.map(np.asarray, current), dict(zip(self._measuring, of_outputs, strict=True))
         if self._current is None:
             self._current = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), current)
-            self._turns = {which: np.zeros((len(angle), len(self.steps))) for which, angle in first_angles.items()}
+            self._turns = {index: np.zeros((len(angle), len(self.steps))) for index, angle in first_angles.items()}
         self._put(runs, current)
-        for which, angle in first_angles.items():
-            self._turns[which][:, runs] = angle
+        for index, angle in first_angles.items():
+            self._turns[index][:, runs] = angle
         self._note(runs, np.zeros(len(runs), int), current.expansion.state, time, current.angles, first_angles)
 
     def advance(self, runs: np.ndarray) -> None:
         """Advance runs by some steps, and store their outputs at the instants that they pass."""
         current = jax.tree.map(lambda x: x[..., runs], self._current)
         method = integrator(self.method, self._made.at(runs)[0], current)
-        shared, how = (RunLimits(*map(np.asarray, self.limits)),), {"method": method, "steps": STEPS}
-        marched, backend = mapped_runs(march_runs, self._made, runs, shared, (current,), **how)
+        shared, options = (RunLimits(*map(np.asarray, self.limits)),), {"method": method, "steps": STEPS}
+        result, backend = mapped_runs(march_runs, self._made, runs, shared, (current,), **options)
         self.backends.add(backend)
-        current, (steps, taken) = marched
+        current, (steps, taken) = result
         self._put(runs, current)
         self.steps[runs] += taken.sum(axis=0)
         angles = self._counted(runs, steps)
-        begin, now = self._direction * steps.start, self._direction * self.instants
+        starts, times = self._direction * steps.start, self._direction * self.instants
         end = self._direction * current.time + 1e-14 * np.abs(current.time)
-        near = np.flatnonzero((now >= begin[0].min()) & (now <= end.max()))
-        passed = taken & (begin <= now[near, None, None])  # instants, steps, runs
+        visited = np.flatnonzero((times >= starts[0].min()) & (times <= end.max()))
+        passed = taken & (starts <= times[visited, None, None])  # instants, steps, runs
         step = passed.shape[1] - 1 - np.argmax(passed[:, ::-1], axis=1)
-        instant, lane = np.nonzero(passed.any(axis=1) & (now[near, None] <= end))
+        instant, lane = np.nonzero(passed.any(axis=1) & (times[visited, None] <= end))
         step = step[instant, lane]
         polynomial = steps.polynomial.map(lambda part: np.moveaxis(part[step, ..., lane], 0, -1))
-        before = {which: series[..., step, lane] for which, series in angles.items()}
-        since, length = self.instants[near[instant]] - steps.start[step, lane], steps.length[step, lane]
-        share = since / np.where(length == 0.0, 1.0, length)
-        before |= self._counted_about_axes(runs, steps, taken, (step, lane, share))
-        known = tuple(part[step, :, lane].T for part in steps.angles)
-        self._note(runs[lane], near[instant], polynomial, steps.start[step, lane], known, before)
-        lost = runs[current.outcome == Outcome.LOST]
-        self._reached[lost] = False
+        before = {index: series[..., step, lane] for index, series in angles.items()}
+        elapsed, length = self.instants[visited[instant]] - steps.start[step, lane], steps.length[step, lane]
+        fraction = elapsed / np.where(length == 0.0, 1.0, length)
+        before |= self._counted_about_axes(runs, steps, taken, (step, lane, fraction))
+        force_angles = tuple(part[step, :, lane].T for part in steps.angles)
+        self._note(runs[lane], visited[instant], polynomial, steps.start[step, lane], force_angles, before)
+        failed = runs[current.outcome == Outcome.LOST]
+        self._reached[failed] = False
         for values in self._values.values():
-            values[lost] = np.nan
+            values[failed] = np.nan
 
     def _put(self, runs: np.ndarray, current: IntegratorState) -> None:
-        for whole, part in zip(jax.tree.leaves(self._current), jax.tree.leaves(current), strict=True):
-            whole[..., runs] = part
+        for array, part in zip(jax.tree.leaves(self._current), jax.tree.leaves(current), strict=True):
+            array[..., runs] = part
 
     def _counted(self, runs: np.ndarray, steps: DenseOutput) -> dict[int, np.ndarray]:
         """Return the series of turning outputs at the starts of steps, revolutions counted; steps and runs last."""
@@ -269,17 +269,17 @@ class _Runs:
         time = np.concatenate([self._begun[runs][None], steps.start])
         self._begun[runs] = time[-1]
         _, outputs = self._made.at(np.tile(runs, len(steps.start)))
-        for which, group in enumerate(outputs):
+        for index, group in enumerate(outputs):
             if group.element.turning and not measures_angle(group):
                 state = steps.polynomial.map(lambda part: np.moveaxis(part[:, :3], 0, -2))
                 state = state.map(lambda part: part.reshape(*part.shape[:-2], -1))
                 (series,) = output_series((group,), pose_coordinates(state), self.parametric.model.pose_type)
                 series = np.array(series).reshape(*series.shape[:-1], *steps.start.shape)
-                last = self._angles.setdefault(which, np.full((*series.shape[:-2], len(self.steps)), np.nan))
-                whole = np.concatenate([last[..., runs][..., None, :], series], axis=-2)
-                series[0] -= np.cumsum(turned(whole[..., :-1, :], whole[..., 1:, :], np.diff(time, axis=0)), axis=-2)
+                last = self._angles.setdefault(index, np.full((*series.shape[:-2], len(self.steps)), np.nan))
+                path = np.concatenate([last[..., runs][..., None, :], series], axis=-2)
+                series[0] -= np.cumsum(turned(path[..., :-1, :], path[..., 1:, :], np.diff(time, axis=0)), axis=-2)
                 last[..., runs] = series[..., -1, :]
-                counted[which] = series
+                counted[index] = series
         return counted
 
     def _counted_about_axes(
@@ -300,25 +300,28 @@ class _Runs:
         number[step, lane] = np.arange(len(lane))
         last = np.append(lane[1:] != lane[:-1], True)  # of the steps of a run
         counted_angles = {}
-        for which, turns in self._turns.items():
+        for index, turns in self._turns.items():
 
-            def measured(which_step: np.ndarray, share: np.ndarray, which: int = which) -> np.ndarray:
-                at, of = step[which_step], lane[which_step]
-                attitudes = attitudes_at(steps.polynomial.attitude[at, ..., of], share * steps.length[at, of])
-                _, outputs = self._made.at(runs[of])
-                return raw_angles([outputs[which]], {"quaternion": attitudes})[0]
+            def measured(which_step: np.ndarray, fraction: np.ndarray, index: int = index) -> np.ndarray:
+                k, r = step[which_step], lane[which_step]
+                attitudes = attitudes_at(
+                    steps.polynomial.attitude[k, ..., r],
+                    fraction * steps.length[k, r],
+                )
+                _, outputs = self._made.at(runs[r])
+                return raw_angles([outputs[index]], {"quaternion": attitudes})[0]
 
             counted = counted_along(measured, lane, turns[:, runs[lane]], POINTS_IN_STEP)
-            counted_angles[which] = counted.near(number[positions[0], positions[1]], positions[2])
+            counted_angles[index] = counted.near(number[positions[0], positions[1]], positions[2])
             turns[:, runs[lane[last]]] = counted.near(np.flatnonzero(last), np.ones(last.sum()))
         return counted_angles
 
     def _note(
         self,
         runs: np.ndarray,
-        at: np.ndarray,
+        instant_indices: np.ndarray,
         polynomial: State,
-        begin: np.ndarray,
+        starts: np.ndarray,
         angles: tuple[np.ndarray, ...],
         before: dict[int, np.ndarray],
     ) -> None:
@@ -329,32 +332,32 @@ class _Runs:
         """
         for lanes in self.chunks(np.arange(len(runs))):
             turned_by = tuple(angle[:, lanes] for angle in angles)
-            time = self.instants[at[lanes]]
-            since = time - begin[lanes]
-            motion = turned_by, polynomial.map(lambda part, lanes=lanes: part[..., lanes]), since, time
-            noted, backend = mapped_runs(outputs_of_runs, self._made, runs[lanes], (), (motion,), order=self._expansion)
+            time = self.instants[instant_indices[lanes]]
+            elapsed = time - starts[lanes]
+            motion = turned_by, polynomial.map(lambda part, lanes=lanes: part[..., lanes]), elapsed, time
+            found, backend = mapped_runs(outputs_of_runs, self._made, runs[lanes], (), (motion,), order=self._expansion)
             self.backends.add(backend)
-            for which, series in enumerate(map(np.array, noted)):
-                if which in self._turns:
-                    series[0, 0] = shifted_by_turns(series[0, 0], before[which][:, lanes])
-                elif which in before:
-                    series[0] -= turned(before[which][..., lanes], series, since)
+            for index, series in enumerate(map(np.array, found)):
+                if index in self._turns:
+                    series[0, 0] = shifted_by_turns(series[0, 0], before[index][:, lanes])
+                elif index in before:
+                    series[0] -= turned(before[index][..., lanes], series, elapsed)
                 values = np.moveaxis(series[: self.order + 1], -1, 0)
-                if which not in self._values:
-                    self._values[which] = np.full((*self._reached.shape, *values.shape[1:]), np.nan)
-                self._values[which][runs[lanes], at[lanes]] = values
-            self._reached[runs[lanes], at[lanes]] = True
+                if index not in self._values:
+                    self._values[index] = np.full((*self._reached.shape, *values.shape[1:]), np.nan)
+                self._values[index][runs[lanes], instant_indices[lanes]] = values
+            self._reached[runs[lanes], instant_indices[lanes]] = True
 
 
-def turned(before: np.ndarray, after: np.ndarray, since: np.ndarray) -> np.ndarray:
+def turned(before: np.ndarray, after: np.ndarray, elapsed: np.ndarray) -> np.ndarray:
     """Return the whole revolutions, in rad, to subtract from an angle to continue an earlier one.
 
     Parameters
     ----------
     before, after : array of shape (order + 1, ...)
         Taylor coefficients of the angle, to the second at least; where `before` is NaN, no turns are counted.
-    since : array
+    elapsed : array
         Time from the earlier to the later angle, s.
     """
-    rise = since / 2 * (before[1] + after[1]) + since**2 / 6 * (before[2] - after[2])
+    rise = elapsed / 2 * (before[1] + after[1]) + elapsed**2 / 6 * (before[2] - after[2])
     return np.nan_to_num(whole_periods(after[0] - before[0] - rise))

@@ -99,14 +99,14 @@ class ParametricMechanism:
 
 
 def mapped_runs(
-    function: Mapped, made: VariedTree, runs: np.ndarray, shared: tuple[Any, ...], lanes: tuple[Any, ...], **static: Any
+    function: Mapped, tree: VariedTree, runs: np.ndarray, shared: tuple[Any, ...], lanes: tuple[Any, ...], **static: Any
 ) -> tuple[Any, str]:
     """Return the result of a function for some runs, and the name of its backend.
 
-    The function receives the shared values of `made`, from `ParametricMechanism.of`, before `shared`, and the values of
+    The function receives the shared values of `tree`, from `ParametricMechanism.of`, before `shared`, and the values of
     each run before `lanes`, as for `of_design`.
     """
-    shared, lanes = (made.at(runs[:1]), *shared), (made.own(runs), *lanes)
+    shared, lanes = (tree.at(runs[:1]), *shared), (tree.own(runs), *lanes)
     program = function.program(shared, lanes, large=LARGE, **static)
     return program(lanes), program.backend
 
@@ -145,10 +145,10 @@ class BatchStart:
         rank = with_conditions.model.system.rank
         if (equations if rank is None else rank) < coordinates and parametric.guesses_differ(rows):
             return
-        last = with_conditions.of(rows)
-        count = max(STAGES, int(np.ceil(self._turned(last.at(slice(None))[0], len(rows)) / LARGEST_STAGE)))
+        final_tree = with_conditions.of(rows)
+        count = max(STAGES, int(np.ceil(self._turned(final_tree.at(slice(None))[0], len(rows)) / LARGEST_STAGE)))
         change = (rows - rows[0]) / count
-        self._stages = [with_conditions.of(rows[0] + stage * change) for stage in range(1, count)] + [last]
+        self._stages = [with_conditions.of(rows[0] + stage * change) for stage in range(1, count)] + [final_tree]
 
     def _turned(self, equations: Equations, count: int) -> float:
         """Return the largest difference of drivers of angles about axes between the first run and any other, rad."""
@@ -165,17 +165,17 @@ class BatchStart:
         measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
         angles = [np.broadcast_to(group.element.datum.near, (group.instances, len(runs))) for group in measuring]
         state = self._state.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
-        together = np.full(len(runs), bool(self._stages))
-        for made in self._stages:
-            (state, reached), _ = mapped_runs(followed, made, runs, (np.asarray(self._instant),), (state,))
-            together &= reached
+        continued = np.full(len(runs), bool(self._stages))
+        for stage in self._stages:
+            (state, reached), _ = mapped_runs(followed, stage, runs, (np.asarray(self._instant),), (state,))
+            continued &= reached
             if measuring:
                 coordinates = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))
                 raw = raw_angles(measuring, {"quaternion": coordinates["quaternion"][0]})
-                angles = [shifted_by_turns(angle, near) for near, angle in zip(angles, raw, strict=True)]
+                angles = [shifted_by_turns(angle, reference) for reference, angle in zip(angles, raw, strict=True)]
         count = len([group for group in equations.system.forces if measures_angle(group)])
         start = jax.tree.map(np.array, (state, tuple(angles[:count]), tuple(angles[count:])))
-        for run in np.unique(runs[~together]).tolist():
+        for run in np.unique(runs[~continued]).tolist():
             self._put_one(start, runs == run, run)
         return start
 
@@ -191,8 +191,8 @@ class BatchStart:
             return
         system = start.model.system
         turns = [group.element.datum.near for group in (*system.forces, *system.outputs) if measures_angle(group)]
-        for whole, part in zip(jax.tree.leaves(starts), (*start.state, *turns), strict=True):
-            whole[..., lanes] = part
+        for array, part in zip(jax.tree.leaves(starts), (*start.state, *turns), strict=True):
+            array[..., lanes] = part
 
 
 @mapped(widths=(FEW_RUNS, MANY_RUNS))
@@ -204,10 +204,10 @@ def followed(shared: tuple[Any, Any], lanes: tuple[dict[int, Any], State]) -> tu
     shared : tuple
         Equations, or a tuple that begins with them; and the instant, s.
     lanes : tuple
-        For each run: its `own` values, as for `of_design`, and a state nearby.
+        For each run: its `design` values, as for `of_design`, and a state nearby.
     """
-    (values, instant), (own, state) = shared, lanes
-    equations, *_ = of_design(values, own)
+    (values, instant), (design, state) = shared, lanes
+    equations, *_ = of_design(values, design)
     clock = jnp.broadcast_to(instant, (1, state.position.shape[-1]))
 
     def at_rest(state: State) -> State:
@@ -228,10 +228,10 @@ def outputs_of_runs(
     shared : tuple
         Equations and outputs.
     lanes : tuple
-        For each run: its `own` values, as for `of_design`, and the lanes of `expanded`.
+        For each run: its `design` values, as for `of_design`, and the lanes of `expanded`.
     order
         As for `expanded`.
     """
-    (values,), (own, motion) = shared, lanes
-    *_, series = expanded.function(of_design(values, own), motion, order)
+    (values,), (design, motion) = shared, lanes
+    *_, series = expanded.function(of_design(values, design), motion, order)
     return series

@@ -78,8 +78,8 @@ def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
     state: State | CountedState = State(*(jnp.asarray(part[..., 0]) for part in start.state))
     equations = jax.device_put(start.equations)  # diffrax takes arrays of JAX
     if angles := measured(equations, start.state):
-        known = tuple(part[..., 0] for part in angles)
-        state = CountedState(state.position, state.attitude, state.velocity, state.spin, known)
+        start_angles = tuple(part[..., 0] for part in angles)
+        state = CountedState(state.position, state.attitude, state.velocity, state.spin, start_angles)
     return OrdinaryEquation(diffrax.ODETerm(state_rates), state, equations, mechanism, start)
 
 
@@ -160,13 +160,13 @@ def state_rates(time: Any, state: State | CountedState, equations: Equations) ->
     """
     if isinstance(state, CountedState):
         equations = equations.near(tuple(part[..., None] for part in state.angles))
-    rate, moving = _rates(time, State(*state[:4]), equations)
+    rate, full_state = _rates(time, State(*state[:4]), equations)
     if not isinstance(state, CountedState):
         return rate
-    pose, clock = equations.pose(moving), Jet.variable(jnp.reshape(jnp.asarray(time, float), (1, 1)), 1)
+    pose, clock = equations.pose(full_state), Jet.variable(jnp.reshape(jnp.asarray(time, float), (1, 1)), 1)
     measuring = [group for group in equations.system.forces if measures_angle(group)]
-    turning = (group.velocity(pose, clock).coefficients[0][0, :, 0] for group in measuring)
-    return CountedState(*rate, tuple(turning))
+    angle_rates = (group.velocity(pose, clock).coefficients[0][0, :, 0] for group in measuring)
+    return CountedState(*rate, tuple(angle_rates))
 
 
 def _rates(time: Any, state: State, equations: Equations) -> tuple[State, State]:

@@ -81,7 +81,7 @@ def prepare_run(
         equations = equations_of(free(), masses, gravity)
         return equations, unexpanded(equations, at_rest(free(), free().guess), instants[:1], order=length)
 
-    def one(part: Any, axes: int) -> jax.ShapeDtypeStruct:
+    def shape(part: Any, axes: int) -> jax.ShapeDtypeStruct:
         """Return the shape, for one instant, of a part of the steps."""
         return jax.ShapeDtypeStruct((*part.shape[1:axes], 1), float)
 
@@ -93,8 +93,8 @@ def prepare_run(
         if (beginning := initial_state()) is not None:
             equations, current = beginning
             like = jax.eval_shape(partial(room_for_steps, method, count=1), current)[0]
-            polynomial, now = like.polynomial.map(lambda part: one(part, 4)), jax.ShapeDtypeStruct((1,), float)
-            lanes = tuple(one(part, 2) for part in like.angles), polynomial, now, now
+            polynomial, instant = like.polynomial.map(lambda part: shape(part, 4)), jax.ShapeDtypeStruct((1,), float)
+            lanes = tuple(shape(part, 2) for part in like.angles), polynomial, instant, instant
             expanded.program((equations, free().system.outputs), lanes, large=LARGE, order=motion_order)
 
     form = model.system, length, motion_order, method, watched

@@ -82,12 +82,12 @@ class MechanismRun(AbstractRun):
             return Status.UNBALANCED, f"{', '.join(names) or 'all joints'} at t = {time:g} s"
         kink = int(self.parts[-1].kink[-1]) if self.parts else -1
         if current.short.item() >= STUCK and kink >= 0:
-            words = "switches without end, as dry friction does at rest: smooth it, as by tanh(v/v0)"
-            return Status.COLLAPSED, f"{watched_names(self.start.model)[kink]} at t = {time:g} s {words}"
+            fault = "switches without end, as dry friction does at rest: smooth it, as by tanh(v/v0)"
+            return Status.COLLAPSED, f"{watched_names(self.start.model)[kink]} at t = {time:g} s {fault}"
         acceleration = np.abs(np.asarray(current.expansion.acceleration[0])[..., 0])
-        rubbing = joints_with_friction(self.start.model, self.start.model.system)
-        if rubbing and not np.isfinite(acceleration).all():
-            return Status.LOCKED, f"friction locks at t = {time:g} s: {', '.join(rubbing)}"
+        joints = joints_with_friction(self.start.model, self.start.model.system)
+        if joints and not np.isfinite(acceleration).all():
+            return Status.LOCKED, f"friction locks at t = {time:g} s: {', '.join(joints)}"
         if (blocked := current.blocked.item()) >= 0:
             return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"
         scale = np.asarray(self.start.equations.system.column_scale)[:, None]
@@ -97,7 +97,7 @@ class MechanismRun(AbstractRun):
 
 def unsound_forces(start: ConsistentStart, sound: Bool[np.ndarray, " force"]) -> str:
     """Return the names of the applied forces that are not sound, as text."""
-    return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), sound, strict=True) if not good)
+    return ", ".join(f"forces.{n}" for n, is_sound in zip(force_names(start.model), sound, strict=True) if not is_sound)
 
 
 def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
@@ -115,8 +115,8 @@ def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[N
 
 def _unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:
     """Return the names of the applied forces with low derivatives that are not finite at an instant, as text."""
-    known = np.isfinite(coordinates["position"]).reshape(len(coordinates["position"]), -1).all(axis=1)
-    order = min(int(np.argmin(np.append(known, False))) - 1, FEW)
+    is_finite = np.isfinite(coordinates["position"]).reshape(len(coordinates["position"]), -1).all(axis=1)
+    order = min(int(np.argmin(np.append(is_finite, False))) - 1, FEW)
     if order < 1:
         return ""
     pose = pose_of(cut(coordinates, order), start.model.pose_type)
@@ -125,6 +125,6 @@ def _unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: floa
         with np.errstate(all="ignore"):  # nonfinite values are reported by name
             sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
         sizes = np.broadcast_to(sizes, (*sizes.shape[:2], len(members), 1))
-        good = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))
-        names += [f"forces.{name}" for name, fit in zip(members, good, strict=True) if not fit]
+        is_sound = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))
+        names += [f"forces.{name}" for name, fit in zip(members, is_sound, strict=True) if not fit]
     return ", ".join(names)

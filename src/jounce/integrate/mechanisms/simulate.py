@@ -220,9 +220,9 @@ def _events_at_ends(start: ConsistentStart) -> list[Event]:
 def _check_ends(start: ConsistentStart, instant: float) -> None:
     """Raise SolveError if a point starts beyond an end of its curve."""
     curves = ends_of(start.model)
-    if curves and (beyond := beyond_end(curves, {"position": np.asarray(with_ground(start.state.position))})):
+    if curves and (fault := beyond_end(curves, {"position": np.asarray(with_ground(start.state.position))})):
         status = Status.END_OF_CURVE
-        raise SolveError(f"t = {instant:g} s, {beyond}: end of curve: {status.advice}", status=status)
+        raise SolveError(f"t = {instant:g} s, {fault}: end of curve: {status.advice}", status=status)
 
 
 def _check_forces(start: ConsistentStart, instant: float) -> None:

@@ -78,10 +78,10 @@ def of_traced_robots(traced: Callable[..., Any]) -> Callable[[Callable[P, R]], C
     def guarded(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
         def wrapper(*arguments: P.args, **keywords: P.kwargs) -> R:
-            others = dict(keywords)
-            robot, *positional = arguments or (others.pop("mechanism", None),)
-            if isinstance(robot, Robot) and not robot.closures and is_traced((robot.tree, positional, others)):
-                return traced(function, robot, *positional, **others)
+            options = dict(keywords)
+            robot, *positional = arguments or (options.pop("mechanism", None),)
+            if isinstance(robot, Robot) and not robot.closures and is_traced((robot.tree, positional, options)):
+                return traced(function, robot, *positional, **options)
             return function(*arguments, **keywords)
 
         return wrapper
@@ -111,20 +111,20 @@ def traced_robot_motion(
             "not differentiated over it: let it pass steeply, such as tanh(v/v0)"
         )
         raise UnsupportedError(message, name="torque")
-    known = simulation._problem
-    problem = with_fields(known, equations=with_fields(known.equations, tree=robot.tree))
-    start, length = _divided(known, simulation)
+    numeric = simulation._problem
+    problem = with_fields(numeric, equations=with_fields(numeric.equations, tree=robot.tree))
+    start, length = _divided(numeric, simulation)
     first = jax.tree.map(lambda x: jnp.asarray(x)[0, 0, :, None], simulation.steps.polynomial)
     first = _begun(robot, problem, first, options.get("state"))
     instants = simulation.time
-    _, which = steps_of(simulation.steps._replace(start=start, length=length), instants)
-    since = instants - start[which]
+    _, indices = steps_of(simulation.steps._replace(start=start, length=length), instants)
+    elapsed = instants - start[indices]
     levels = max(simulation.order - 2, 0)
-    more = -len(start) % PADDED  # steps of no length
-    whole = np.append(start, np.full(more, start[-1] + length[-1])), np.append(length, np.zeros(more))
-    series = _marched(problem, first, *whole, which, since, instants, levels=levels)
-    changing = jnp.moveaxis(plain_derivatives(series), -1, 0)[:, : simulation.order + 1]
-    return TracedRobotMotion(robot, instants, simulation.order, with_value(changing, simulation.q), simulation)
+    padding = -len(start) % PADDED  # steps of no length
+    padded_steps = np.append(start, np.full(padding, start[-1] + length[-1])), np.append(length, np.zeros(padding))
+    series = _marched(problem, first, *padded_steps, indices, elapsed, instants, levels=levels)
+    derivatives = jnp.moveaxis(plain_derivatives(series), -1, 0)[:, : simulation.order + 1]
+    return TracedRobotMotion(robot, instants, simulation.order, with_value(derivatives, simulation.q), simulation)
 
 
 def _begun(robot: Robot, problem: RobotProblem, first: RobotState, state: Any) -> RobotState:
@@ -132,8 +132,8 @@ def _begun(robot: Robot, problem: RobotProblem, first: RobotState, state: Any) -
     if not is_traced(state):
         return first
     q, rates = start_levels(robot, state)[..., None]
-    held = jnp.asarray(problem.equations.driven)[:, None] > 0
-    coordinates, velocities = (jnp.where(held, a, b) for a, b in ((first.coordinates, q), (first.rates, rates)))
+    is_driven = jnp.asarray(problem.equations.driven)[:, None] > 0
+    coordinates, velocities = (jnp.where(is_driven, a, b) for a, b in ((first.coordinates, q), (first.rates, rates)))
     return first._replace(coordinates=coordinates, rates=velocities)
 
 
@@ -144,15 +144,15 @@ def _recorded(
     names = [name for name, link in robot.links.items() if isinstance(link.inertia, TracedInertia)]
 
     def simulated(values: tuple[Any, Any]) -> RobotSimulation:
-        links, own = dict(robot.links), options
+        links, settings = dict(robot.links), options
         if isinstance(state := values[1], Mapping):
-            own = {**options, "state": {name: float(x) for name, x in state.items()}}
+            settings = {**options, "state": {name: float(x) for name, x in state.items()}}
         elif state is not None:
-            own = {**options, "state": jax.tree.map(np.asarray, state)}
+            settings = {**options, "state": jax.tree.map(np.asarray, state)}
         for name, (mass, center, tensor) in zip(names, values[0], strict=True):
             inertia = Inertia(float(mass), np.asarray(center), np.asarray(tensor), strict=robot.strict)
             links[name] = dataclasses.replace(links[name], inertia=inertia)
-        return simulate(robot.changed(links=list(links.values())), *positional, **own)
+        return simulate(robot.changed(links=list(links.values())), *positional, **settings)
 
     inertias = [robot.links[name].inertia for name in names]
     numbers = [(x.mass, x.center_of_mass, x.tensor) for x in inertias if x is not None]
@@ -167,8 +167,8 @@ def _divided(problem: RobotProblem, simulation: RobotSimulation) -> tuple[np.nda
     steps = simulation.steps
     states = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[:, 0], 0, -1), steps.polynomial)
     count = len(steps.start)
-    wide, start = jax.tree.map(lambda x: padded(x, -(-count // PADDED) * PADDED), (states, steps.start))
-    growth = np.asarray(_growth(problem, wide, start))[:, :count]
+    padded_states, start = jax.tree.map(lambda x: padded(x, -(-count // PADDED) * PADDED), (states, steps.start))
+    growth = np.asarray(_growth(problem, padded_states, start))[:, :count]
     orders = np.arange(ORDER + 2 - LAST, ORDER + 2)
     with np.errstate(divide="ignore"):
         reach = ((CONVERGED / growth[-LAST:]) ** (1 / orders[:, None])).min(axis=0)
@@ -177,9 +177,9 @@ def _divided(problem: RobotProblem, simulation: RobotSimulation) -> tuple[np.nda
         message = "changes of the motion grow too fast beside it to be followed; look at a shorter time"
         raise UnsupportedError(message, name="time")
     counts = parts.astype(int)
-    share = np.concatenate([np.arange(n) / n for n in counts])
+    fractions = np.concatenate([np.arange(n) / n for n in counts])
     start, length = np.repeat(steps.start, counts), np.repeat(steps.length, counts)
-    return start + share * length, length / np.repeat(counts, counts)
+    return start + fractions * length, length / np.repeat(counts, counts)
 
 
 @compiled(narrow=True)
@@ -192,8 +192,8 @@ def _growth(problem: RobotProblem, states: RobotState, time: Any) -> Any:
 
     def of(direction: Any) -> Any:
         given = (states.coordinates, states.rates)
-        along = tuple(jnp.broadcast_to(x[:, None], states.rates.shape) for x in jnp.split(direction, 2))
-        return jnp.max(jnp.abs(jax.jvp(coefficients, given, along)[1]), axis=1)
+        tangents = tuple(jnp.broadcast_to(x[:, None], states.rates.shape) for x in jnp.split(direction, 2))
+        return jnp.max(jnp.abs(jax.jvp(coefficients, given, tangents)[1]), axis=1)
 
     return jnp.max(jax.lax.map(of, jnp.eye(2 * states.rates.shape[0])), axis=0)
 
@@ -204,8 +204,8 @@ def _marched(
     first: RobotState,
     start: Any,
     length: Any,
-    which: Any,
-    since: Any,
+    indices: Any,
+    elapsed: Any,
     instants: Any,
     *,
     levels: int,
@@ -220,7 +220,7 @@ def _marched(
         return at(series(state, time[None]), duration[None]), state
 
     _, states = jax.lax.scan(step, first, (start, length))
-    own = jax.tree.map(lambda x: jnp.moveaxis(x[which, :, 0], 0, -1), states)
-    reached = at(series(own, start[which]), since)
-    expanded = problem.series(reached, instants[None], levels, reversible=True)
+    step_states = jax.tree.map(lambda x: jnp.moveaxis(x[indices, :, 0], 0, -1), states)
+    end_states = at(series(step_states, start[indices]), elapsed)
+    expanded = problem.series(end_states, instants[None], levels, reversible=True)
     return coordinates_of(expanded, levels)

@@ -88,12 +88,12 @@ class RobotSimulation(Tabulated):
         self.events = [] if events is None else events
         self._problem, self._ending, self._wrenches = problem, ending, wrenches
         reached, chosen = steps_of(steps, instants)
-        since = np.where(reached, instants - steps.start[chosen], 0.0)
+        elapsed = np.where(reached, instants - steps.start[chosen], 0.0)
         levels = max(order - 2, 0)
 
         def lanes_of(lanes: np.ndarray) -> Any:
             polynomial = jax.tree.map(lambda c: at_steps(c, chosen[lanes]), steps.polynomial)
-            return polynomial, since[lanes], instants[lanes]
+            return polynomial, elapsed[lanes], instants[lanes]
 
         (state, q, twist), backend = expanded_robot.at_instants(problem, lanes_of, len(instants), order=levels)
         self._state = state
@@ -103,9 +103,9 @@ class RobotSimulation(Tabulated):
         if twist is not None:
             rates = plain_derivatives(twist).transpose(2, 0, 1)
             self.base = BaseMotion(state.position.T.copy(), state.quaternion.T.copy(), rates)
-        fine = np.isfinite(self.q).all(axis=(1, 2))
+        is_finite = np.isfinite(self.q).all(axis=(1, 2))
         self.status, self.faults = status_of(steps, instants, reached, ending)
-        self.status[reached & ~fine] = int(Status.UNDEFINED)
+        self.status[reached & ~is_finite] = int(Status.UNDEFINED)
         self.q[~reached] = np.nan
         if self.base is not None:
             for part in (self.base.position, self.base.quaternion, self.base.twist):
@@ -140,7 +140,7 @@ class RobotSimulation(Tabulated):
         damping and friction.
         """
         pairs = zip(self._wrenches, self._problem.wrenches.parts, strict=True)
-        wrenches = [self._along_motion(*both) for both in pairs]
+        wrenches = [self._along_motion(*pair) for pair in pairs]
         torques = inverse_dynamics(
             self.robot, self.q, drives=self._problem.equations.drives, base=self._cut_base(), wrenches=wrenches,
             time=self.time if self._wrenches else None,
@@ -162,14 +162,14 @@ class RobotSimulation(Tabulated):
         factorials = jnp.array([math.factorial(k) for k in range(self.order + 1)], float)
 
         def derivatives(time: Any, q: Any) -> Any:
-            shares = q / factorials[:, None]
+            coefficients = q / factorials[:, None]
 
-            def component(i: int, since: Any) -> Any:
-                q_there, rate = shares[-1], jnp.zeros(q.shape[1:])
-                for share in shares[-2::-1]:  # Horner's rule, and its derivative
-                    rate = rate * since + q_there
-                    q_there = q_there * since + share
-                return jnp.asarray(given(time + since, q_there, rate), float)[i]
+            def component(i: int, elapsed: Any) -> Any:
+                q_there, rate = coefficients[-1], jnp.zeros(q.shape[1:])
+                for coefficient in coefficients[-2::-1]:  # Horner's rule, and its derivative
+                    rate = rate * elapsed + q_there
+                    q_there = q_there * elapsed + coefficient
+                return jnp.asarray(given(time + elapsed, q_there, rate), float)[i]
 
             zero = Jet.variable(jnp.zeros(()), levels - 1)
             return jnp.stack([compose(partial(component, i), zero).derivatives() for i in range(3)], axis=-1)
@@ -231,8 +231,8 @@ class RobotSimulation(Tabulated):
             unit = "rad" if self.robot.joints[name].turning else "m"
             attributes = {"units": unit, "long_name": derivatives_of(name)}
             variables[name] = (tuple(axes), self.q[:, :, k], attributes)
-        about = {"title": self.robot.name, "source": "jounce", "backend": self.backend}
-        return xarray.Dataset(variables, axes, attrs=about)
+        metadata = {"title": self.robot.name, "source": "jounce", "backend": self.backend}
+        return xarray.Dataset(variables, axes, attrs=metadata)
 
 
 @mapped(widths=WIDTHS)
@@ -250,8 +250,8 @@ def expanded_robot(
     order : int
         Coefficients of the coordinates have orders to `order` + 2, those of the twist of a free base to `order` + 1.
     """
-    polynomial, since, time = lanes
-    state = at(polynomial, since)
+    polynomial, elapsed, time = lanes
+    state = at(polynomial, elapsed)
     series = problem.series(state, time[None], order)
     q = coordinates_of(series, order)
     if series.twist is None:

@@ -84,7 +84,7 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     check_holonomic(mechanism, "the derivative of a simulation")
     if (recorded := _recorded(simulate, mechanism, options)) is None:
         return _called(simulate, mechanism, options)
-    simulation, made = recorded
+    simulation, numeric = recorded
     check_not_redundant(simulation.model)
     if any(map(measures_angle, simulation.model.system.forces)):
         message = "a simulation is not differentiated where forces count the turns of an angle about an axis in space"
@@ -94,10 +94,10 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     model, equations = _model_of(mechanism, simulation)
     start = _start(mechanism, simulation, equations)
     order = simulation.poses[1]["position"].shape[0] - 1
-    pieces = divided_steps(simulation.dense_output, equations, _model_of(made, simulation)[1], allowed, kinks)
+    pieces = divided_steps(simulation.dense_output, equations, _model_of(numeric, simulation)[1], allowed, kinks)
     coordinates = _coordinates(simulation, equations, pieces, start, order)
-    known = {name: np.asarray(x) for name, x in simulation.poses[1].items()}
-    coordinates = {name: with_value(x, known[name]) for name, x in coordinates.items()}
+    recorded_coordinates = {name: np.asarray(x) for name, x in simulation.poses[1].items()}
+    coordinates = {name: with_value(x, recorded_coordinates[name]) for name, x in coordinates.items()}
     solved = _solved(simulation, coordinates)
     return TracedMotion(mechanism, (model, model), simulation.time, simulation.order, solved)
 
@@ -106,11 +106,11 @@ def _recorded(
     simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]
 ) -> tuple[Simulation, Mechanism] | None:
     """Return the simulation at the values of the tracers, and its mechanism; None if the values are not known."""
-    values, made = template(mechanism)
+    values, make_mechanism = template(mechanism)
 
     def simulated(values: tuple[Any, ...]) -> tuple[Simulation, Mechanism]:
-        known = made(values)
-        return simulate(known, **options), known
+        numeric = make_mechanism(values)
+        return simulate(numeric, **options), numeric
 
     return recorded(simulated, _as_floats(values))
 
@@ -123,12 +123,12 @@ def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping
     """Return a simulation within `jax.jit` or `jax.vmap`, where the program calls it on the host for each mechanism."""
     order = checked_order(options.get("order", 4))
     instants = given_instants(mechanism, options.get("time"), instants_of)
-    (values, made), levels = template(mechanism), order + max(lost_orders(mechanism.outputs.values()), 1) + 1
+    (values, make_mechanism), levels = template(mechanism), order + max(lost_orders(mechanism.outputs.values()), 1) + 1
     shapes = solved_shapes(mechanism, len(instants), levels)
     options = {**options, "time": instants, "strict": False}
 
     def solved_at(values: tuple[Any, ...]) -> Solved:
-        motion = simulate(made(values), **options)
+        motion = simulate(make_mechanism(values), **options)
         return motion.solved if motion.traced else _solved(motion, dict(motion.poses[1]))
 
     solved = called(partial(solved_or_failed, solved_at, shapes), shapes, _as_floats(values))
@@ -149,20 +149,20 @@ def _angles(simulation: Simulation) -> Angles:
     outputs = simulation.model.system.outputs
     angles = angles_of(simulation.model, (simulation.model.system.forces, outputs))
     measured = [k for k, group in enumerate(outputs) if measures_angle(group)]
-    near = tuple(np.asarray(simulation.output_values(k)[0, 0]) for k in measured)
-    return angles._replace(near=(angles.near[0], near))
+    revolutions = tuple(np.asarray(simulation.output_values(k)[0, 0]) for k in measured)
+    return angles._replace(near=(angles.near[0], revolutions))
 
 
 def _model_of(mechanism: Mechanism, simulation: Simulation) -> tuple[Model, Equations]:
     """Return the model and the equations of motion as functions of the traced values."""
     state = simulation.dense_output.polynomial.map(lambda part: np.asarray(part)[0, :1, ..., None])
-    first, known = first_of(pose_coordinates(state)), simulation.equations
+    first, base = first_of(pose_coordinates(state)), simulation.equations
     model = traced_model(mechanism, simulation.model.length, _angles(simulation), first)
     system = with_fields(
-        model.system, outputs=(), column_scale=known.system.column_scale, row_scale=np.asarray(known.system.row_scale)
+        model.system, outputs=(), column_scale=base.system.column_scale, row_scale=np.asarray(base.system.row_scale)
     )
     masses, gravity = masses_of(mechanism), gravity_of(mechanism)
-    return model, Equations(system, masses, gravity, known.scale, known.pose_type)
+    return model, Equations(system, masses, gravity, base.scale, base.pose_type)
 
 
 def _allowed(options: Mapping[str, Any]) -> float | None:
@@ -176,12 +176,12 @@ def _kinks(simulation: Simulation) -> list[Break]:
     """Return the kinks of forces along a simulation, or raise UnsupportedError if a force or a velocity jumps."""
     dense, kinks = simulation.dense_output, breaks(simulation.dense_output, float(simulation.model.length))
     names = watched_names(simulation.model)
-    for order, what in ((1, "has a kink, so that velocities jump"), (2, "jumps")):
+    for order, event in ((1, "has a kink, so that velocities jump"), (2, "jumps")):
         for jump in kinks:
             if jump.order == order:
                 name, time = names[int(dense.kink[jump.step])], float(dense.start[jump.step] + jump.since)
                 message = (
-                    f"the law {what} at t = {time:.10g} s; how that instant moves is not known, so that a simulation "
+                    f"the law {event} at t = {time:.10g} s; how that instant moves is not known, so that a simulation "
                     "is not differentiated over it: give the law a steep passage, such as tanh(x/width)"
                 )
                 raise UnsupportedError(message, name=name)
@@ -190,20 +190,20 @@ def _kinks(simulation: Simulation) -> list[Break]:
 
 def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -> State:
     """Return the initial state, with derivatives by which joints, drivers and initial conditions remain satisfied."""
-    known = simulation.dense_output.polynomial.map(lambda part: jnp.asarray(part)[0, 0, ..., None])
+    state = simulation.dense_output.polynomial.map(lambda part: jnp.asarray(part)[0, 0, ..., None])
     instant = np.array([[simulation.dense_output.start[0]]])
     start_model = traced_model(initial_as_drivers(mechanism), simulation.model.length)
     scales = {"column_scale": equations.system.column_scale}
-    whole = dataclasses.replace(equations, system=with_fields(start_model.system, outputs=(), forces=(), **scales))
-    rows, columns = whole.system.shape
+    initial = dataclasses.replace(equations, system=with_fields(start_model.system, outputs=(), forces=(), **scales))
+    rows, columns = initial.system.shape
     if rows == columns:
-        return _corrected(whole, _corrected(whole, known, instant), instant)  # twice, for second derivatives
-    _check_guessed(mechanism, simulation, known)
+        return _corrected(initial, _corrected(initial, state, instant), instant)  # twice, for second derivatives
+    _check_guessed(mechanism, simulation, state)
     guess = traced_model(mechanism, simulation.model.length).guess
     position = guess["position"][:, 1:]
     attitude = guess["angle"][None, 1:] if "angle" in guess else guess["quaternion"][:, 1:]
-    inverse = np.linalg.pinv(np.asarray(_jacobian(simulation.equations, known, instant)))
-    return _assembled(equations, known, (position, attitude), inverse, instant)
+    inverse = np.linalg.pinv(np.asarray(_jacobian(simulation.equations, state, instant)))
+    return _assembled(equations, state, (position, attitude), inverse, instant)
 
 
 @compiled(narrow=True)
@@ -214,16 +214,16 @@ def _jacobian(equations: Equations, state: State, instant: Instants) -> Float[Nu
 
 @compiled(narrow=True)
 def _assembled(
-    equations: Equations, known: State, guess: tuple[Any, Any], inverse: Float[Numbers, "column row"], instant: Instants
+    equations: Equations, base: State, guess: tuple[Any, Any], inverse: Float[Numbers, "column row"], instant: Instants
 ) -> State:
     """Return a known state with derivatives by the positions and attitudes of the starting guess.
 
     As in the assembly, the state is the guess moved by the shortest step onto the constraints. `inverse` is the
     pseudoinverse of the Jacobian.
     """
-    state = known._replace(position=guess[0], attitude=guess[1])
+    state = base._replace(position=guess[0], attitude=guess[1])
     state = _moved(equations, state, instant, lambda gap: -(inverse @ gap))
-    factor = jax.lax.stop_gradient(equations).factored(known, instant)
+    factor = jax.lax.stop_gradient(equations).factored(base, instant)
     return equations.with_rates(factor, state, instant)
 
 
@@ -235,13 +235,13 @@ def _moved(equations: Equations, state: State, time: Instants, change: Callable[
     return state._replace(position=pose.position.coefficients[0][:, 1:], attitude=equations.attitude_of(pose))
 
 
-def _check_guessed(mechanism: Mechanism, simulation: Simulation, known: State) -> None:
+def _check_guessed(mechanism: Mechanism, simulation: Simulation, state: State) -> None:
     """Raise UnsupportedError unless an initial state that is not prescribed is the starting guess itself, at rest."""
     guess = at_rest(simulation.model, simulation.model.guess)
-    away = np.abs(guess.position - known.position).max() / simulation.model.length
-    turned = np.abs(guess.attitude - known.attitude).max()
-    speed = max(float(np.abs(np.asarray(part)).max()) for part in known[2:])
-    if mechanism.initial or max(away, turned) > AS_GUESSED or speed > AT_REST:
+    distance = np.abs(guess.position - state.position).max() / simulation.model.length
+    angle = np.abs(guess.attitude - state.attitude).max()
+    speed = max(float(np.abs(np.asarray(part)).max()) for part in state[2:])
+    if mechanism.initial or max(distance, angle) > AS_GUESSED or speed > AT_REST:
         raise UnsupportedError(
             "the start follows from the starting guess and from least velocities, and is differentiated only where "
             "the guess fulfills all joints and all is at rest; give an initial condition for each degree of freedom",
@@ -255,8 +255,8 @@ def _coordinates(
     """Return the Taylor coefficients of the coordinates at the instants, after recorded steps from an initial state."""
     instants = simulation.time
     chosen = pieces.at(instants)
-    since = instants - pieces.start[chosen]
-    return pose_coordinates(_marched(equations, start, pieces.padded(), chosen, since, instants, order=order))
+    elapsed = instants - pieces.start[chosen]
+    return pose_coordinates(_marched(equations, start, pieces.padded(), chosen, elapsed, instants, order=order))
 
 
 @compiled("order", narrow=True)
@@ -265,7 +265,7 @@ def _marched(
     start: State,
     pieces: Pieces,
     chosen: Int[Numbers, " time"],
-    since: Float[Numbers, " time"],
+    elapsed: Float[Numbers, " time"],
     instants: Float[Numbers, " time"],
     *,
     order: int,
@@ -285,15 +285,15 @@ def _marched(
     @jax.checkpoint
     def march(carry: Any, step: Any) -> tuple[Any, State]:
         state, kinked = carry
-        time, length, recorded_state, used, over = step
+        time, length, recorded_state, used, kink = step
         time, length, state = time[None], length[None], jax.tree.map(with_value, state, recorded_state)
         expanded = series(state, used[:, None], time)
         arrived, end = evaluated(expanded, length), time + length
-        if over is not None:
-            behind, late = refined_kink_state(state, expanded, length, kinked, over)
-            left = Kinked(expanded_about(expanded, length, KINKED - 1), jnp.zeros_like(length))
-            back = (behind, time, kinked._replace(late=late))
-            arrived, end, kinked = jax.tree.map(lambda a, b: jnp.where(over.back, a, b), back, (arrived, end, left))
+        if kink is not None:
+            behind, delay = refined_kink_state(state, expanded, length, kinked, kink)
+            new = Kinked(expanded_about(expanded, length, KINKED - 1), jnp.zeros_like(length))
+            rewound = (behind, time, kinked._replace(late=delay))
+            arrived, end, kinked = jax.tree.map(lambda a, b: jnp.where(kink.back, a, b), rewound, (arrived, end, new))
         return (_corrected(equations, arrived, end[None]), kinked), state
 
     none = None
@@ -302,11 +302,11 @@ def _marched(
     path = starts, lengths, known.map(lambda part: part[..., None]), used, kinks
     _, states = jax.lax.scan(march, (start, none), path)
     chosen_states = states.map(lambda part: jnp.moveaxis(part[chosen, ..., 0], 0, -1))
-    time = instants - since
+    time = instants - elapsed
 
     @jax.checkpoint
     def arrive(state: State) -> State:
-        arrived = evaluated(series(state, used[chosen].T, time), since)
+        arrived = evaluated(series(state, used[chosen].T, time), elapsed)
         return series_through(equations, _corrected(equations, arrived, instants[None]), instants[None], order)
 
     return arrive(chosen_states)

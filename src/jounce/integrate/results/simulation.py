@@ -82,9 +82,9 @@ class Simulation(Motion):
         reached, chosen = steps_of(dense, instants)
 
         def lanes_of(lanes: np.ndarray) -> Any:
-            steps, now = chosen[lanes], instants[lanes]
+            steps, times = chosen[lanes], instants[lanes]
             polynomial = dense.polynomial.map(lambda part: at_steps(part, steps))
-            return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
+            return tuple(part[steps].T for part in dense.angles), polynomial, times - dense.start[steps], times
 
         outputs, levels = start.model.system.outputs, {"order": derivatives_of_motion(mechanism, order)}
         outcome, backend = expanded.at_instants((start.equations, outputs), lanes_of, len(instants), **levels)
@@ -93,15 +93,15 @@ class Simulation(Motion):
             self._counted(group, series, instants) for group, series in zip(outputs, outputs_found, strict=True)
         )
         status, faults = status_of(dense, instants, reached, ending)
-        lost = reached & ~np.isfinite(np.concatenate([p.reshape(-1, len(instants)) for p in state])).all(axis=0)
+        unknown = reached & ~np.isfinite(np.concatenate([p.reshape(-1, len(instants)) for p in state])).all(axis=0)
         for names, series in zip(start.model.outputs, groups, strict=True):
-            bad = ~np.isfinite(series[: order + 1]).all(axis=(0, 1)) & reached & ~lost  # (outputs, time)
-            undefined = np.flatnonzero(bad.any(axis=0))
+            nonfinite = ~np.isfinite(series[: order + 1]).all(axis=(0, 1)) & reached & ~unknown  # (outputs, time)
+            undefined = np.flatnonzero(nonfinite.any(axis=0))
             status[undefined] = int(Status.UNDEFINED)
-            faults |= {int(lane): f"output {names[int(np.argmax(bad[:, lane]))]}" for lane in undefined}
-        if lost.any():  # the state is known, but not its derivatives
+            faults |= {int(lane): f"output {names[int(np.argmax(nonfinite[:, lane]))]}" for lane in undefined}
+        if unknown.any():  # the state is known, but not its derivatives
             reason = ending[0] if ending[0] == Status.LOCKED else Status.INADMISSIBLE
-            status[lost], faults[int(np.argmax(lost))] = int(reason), ending[1]
+            status[unknown], faults[int(np.argmax(unknown))] = int(reason), ending[1]
         values = tuple(plain_derivatives(np.asarray(series)) for series in groups)
         super().__init__(
             mechanism, start.model, instants, order, (partial(pose_coordinates, state), values), status, faults
@@ -144,12 +144,12 @@ class Simulation(Motion):
         kink, length = self.dense_output.kink, np.abs(self.dense_output.length)
         names = watched_names(self._start.model)
         before = [length[max(k - APPROACH, 0) : k].max(initial=0.0) for k in range(len(length) - 1)]
-        short = MUCH_LONGER * length[:-1]
-        indices = np.flatnonzero((kink[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
-        since = {int(k): float(self.dense_output.length[k]) for k in indices}
+        limits = MUCH_LONGER * length[:-1]
+        indices = np.flatnonzero((kink[:-1] >= 0) & (length[1:] > limits) & (np.array(before) > limits))
+        delays = {int(k): float(self.dense_output.length[k]) for k in indices}
         # series that the next step does not continue give the time, and after a long approach they alone show the kink
-        since |= {x.step: x.since for x in breaks(self.dense_output, float(self.model.length)) if kink[x.step] >= 0}
-        return [(float(self.dense_output.start[k] + since[k]), names[kink[k]]) for k in sorted(since)]
+        delays |= {x.step: x.since for x in breaks(self.dense_output, float(self.model.length)) if kink[x.step] >= 0}
+        return [(float(self.dense_output.start[k] + delays[k]), names[kink[k]]) for k in sorted(delays)]
 
     @property
     def ended_at(self) -> float:
@@ -199,8 +199,8 @@ class Simulation(Motion):
             return AttitudeHistory(self._attitudes_at(dense.start), dense.start)
         instants = (dense.start[:, None] + dense.length[:, None] * (np.arange(POINTS_IN_STEP) / POINTS_IN_STEP)).ravel()
         instants = np.append(instants, dense.end)
-        along = revolution_counts.attitudes_along(dense.polynomial.attitude, dense.length, POINTS_IN_STEP)
-        return AttitudeHistory(along, instants, between=self._attitudes_at)
+        samples = revolution_counts.attitudes_along(dense.polynomial.attitude, dense.length, POINTS_IN_STEP)
+        return AttitudeHistory(samples, instants, between=self._attitudes_at)
 
     def _attitudes_at(self, instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "4 bodies time"]:
         dense, chosen = self.dense_output, self.steps_at(instants)
@@ -227,11 +227,11 @@ class Simulation(Motion):
             return series
         kind = self._start.model.pose_type
         pieces = in_pieces(group, dense.polynomial, dense.length, 1, kind, lambda x: x[1:2])
-        nodes, known = pieces.time(dense.start, dense.length), pieces.series[:2]
-        known = known.reshape(*known.shape[:3], -1)
-        counted = counted_by_rates(known[0], known[1], nodes)
-        near = np.abs(nodes[None] - instants[:, None]).argmin(axis=1)
-        expected = counted[..., near] + (instants - nodes[near]) * 0.5 * (known[1][..., near] + series[1])
+        nodes, node_values = pieces.time(dense.start, dense.length), pieces.series[:2]
+        node_values = node_values.reshape(*node_values.shape[:3], -1)
+        counted = counted_by_rates(node_values[0], node_values[1], nodes)
+        index = np.abs(nodes[None] - instants[:, None]).argmin(axis=1)
+        expected = counted[..., index] + (instants - nodes[index]) * 0.5 * (node_values[1][..., index] + series[1])
         series[0] = shifted_by_turns(series[0], expected)
         return series
 
@@ -273,11 +273,11 @@ def status_of(
     status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
     if ending[0] == Status.OK:
         return status, {}
-    beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
-    if not beyond.size:
+    unreached = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
+    if not unreached.size:
         return status, {}
-    status[beyond[0]] = int(ending[0])
-    return status, {int(beyond[0]): ending[1]}
+    status[unreached[0]] = int(ending[0])
+    return status, {int(unreached[0]): ending[1]}
 
 
 def at_steps(part: np.ndarray, chosen: Int[np.ndarray, " batch"]) -> np.ndarray:
@@ -327,9 +327,9 @@ def expanded(
     state, _, inverse = projected(counted, evaluated(polynomial, step), instants[None])
     series = expand(counted, state, instants[None], order, inverse).state
     if len(polynomial.position) > order:  # steps of another solver have fewer coefficients
-        singular, own = near_singular(counted, inverse), expanded_about(polynomial, step, order)
+        singular, step_series = near_singular(counted, inverse), expanded_about(polynomial, step, order)
         series = State(
-            *(jnp.concatenate([x[:1], jnp.where(singular, y, x)[1:]]) for x, y in zip(series, own, strict=True))
+            *(jnp.concatenate([x[:1], jnp.where(singular, y, x)[1:]]) for x, y in zip(series, step_series, strict=True))
         )
     outputs_found = output_series(outputs, pose_coordinates(series), equations.pose_type)
     return series, revolution_counts.measured(counted, state), outputs_found

@@ -87,15 +87,15 @@ def is_balanced(equations: Equations, state: State, time: Instants) -> bool:
         return False
 
     def power(group: Group) -> Callable[[Instants], Numbers]:
-        return lambda now: group.power(pose, Jet.variable(now, 1)).coefficients[0]
+        return lambda t: group.power(pose, Jet.variable(t, 1)).coefficients[0]
 
-    known = all(type(group.element).energy is not AbstractForce.energy for group in forces)
-    return known and not any(uses(jax.make_jaxpr(power(group))(time)) for group in forces)
+    states_energy = all(type(group.element).energy is not AbstractForce.energy for group in forces)
+    return states_energy and not any(uses(jax.make_jaxpr(power(group))(time)) for group in forces)
 
 
 def _is_moved(group: Group, at_rest: Pose, time: Instants) -> bool:
     """Return whether the residual of joints or drivers depends on time."""
-    return uses(jax.make_jaxpr(lambda now: group.residual(at_rest, Jet([now])).coefficients[0])(time))
+    return uses(jax.make_jaxpr(lambda t: group.residual(at_rest, Jet([t])).coefficients[0])(time))
 
 
 def energies(equations: Equations, pose: Pose, clock: Jet) -> Energies:
@@ -117,14 +117,14 @@ def energies(equations: Equations, pose: Pose, clock: Jet) -> Energies:
 
 def initial_balance(energies: Energies) -> Balance:
     """Return the energy balance at the start of runs."""
-    nothing = jnp.zeros_like(energies.kinetic)
-    return Balance(energies, energies.kinetic, nothing, energies.exchanging, nothing > 0)
+    zeros = jnp.zeros_like(energies.kinetic)
+    return Balance(energies, energies.kinetic, zeros, energies.exchanging, zeros > 0)
 
 
-def unknown(nothing: Lanes) -> Balance:
+def unknown(zeros: Lanes) -> Balance:
     """Return a placeholder of zeros for the energy balance before the start."""
-    none = np.zeros(nothing.shape, bool)
-    return Balance(Energies(nothing, nothing, nothing, none), nothing, nothing, none, none)
+    none = np.zeros(zeros.shape, bool)
+    return Balance(Energies(zeros, zeros, zeros, none), zeros, zeros, none, none)
 
 
 def followed(balance: Balance, energies: Energies, leeway: Lanes) -> tuple[Balance, Flags]:

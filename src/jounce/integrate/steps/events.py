@@ -88,11 +88,11 @@ class Event:
                 "Euler angles jump by whole turns; watch an entry of the rotation matrix, or a RelativeAngleOutput"
             )
             raise MechanismError(message, name="output", value=type(self.output).__name__)
-        counted = {} if isinstance(self.component, str) else {"component": 4}
-        check_crossing(self, MechanismError, derivative=4, **counted)
+        limits = {} if isinstance(self.component, str) else {"component": 4}
+        check_crossing(self, MechanismError, derivative=4, **limits)
 
 
-def check_crossing(event: Any, error: type[JounceError], **most: int) -> None:
+def check_crossing(event: Any, error: type[JounceError], **limits: int) -> None:
     """Raise `error` unless the value, the direction and the whole numbers of an event, up to their limits, are valid.
 
     The value is converted to a Python float.
@@ -101,7 +101,7 @@ def check_crossing(event: Any, error: type[JounceError], **most: int) -> None:
     if number.ndim or not np.isfinite(number):
         raise error("must be a finite number", name="value", value=event.value)
     object.__setattr__(event, "value", float(number))
-    for name, limit in most.items():
+    for name, limit in limits.items():
         whole_number(name, getattr(event, name), most=limit, error=error)
     if event.direction not in (-1, 0, 1):
         raise error("must be -1, 0 or 1", name="direction", value=event.direction)
@@ -152,8 +152,8 @@ class Pieces(NamedTuple):
 
     def time(self, start: Float[np.ndarray, " step"], length: Float[np.ndarray, " step"]) -> Any:
         """Return the times of all nodes, flattened, from the starts and lengths of steps, s."""
-        share = self.begin[:, None] + (self.end - self.begin)[:, None] * NODES
-        return (start[self.step][:, None] + share * length[self.step][:, None]).ravel()
+        fractions = self.begin[:, None] + (self.end - self.begin)[:, None] * NODES
+        return (start[self.step][:, None] + fractions * length[self.step][:, None]).ravel()
 
 
 def in_pieces(
@@ -186,23 +186,23 @@ def in_pieces(
     """
     count = len(length)
     step, begin, end = np.arange(count), np.zeros(count), np.ones(count)
-    size, before, whole = None, np.full(count, np.inf), []
+    size, before, finished = None, np.full(count, np.inf), []
     for split in range(SPLITS + 1):
-        share = begin[:, None] + (end - begin)[:, None] * np.concatenate([NODES, ENDS])
-        own = polynomial.map(lambda part, of=step: part[of])
-        series = _at(group, own, length[step][:, None] * share, order, pose_type)
-        size, left = _unresolved(judged(series).reshape(-1, *share.shape), step, size)
-        wide = (left > RESOLVED) & ~((left < BLURRED) & (left > 0.25 * before))
-        if split == SPLITS or len(step) + np.count_nonzero(wide) > MOST_PIECES * count:
-            wide[:] = False
-        whole.append(Pieces(step[~wide], begin[~wide], end[~wide], series[..., ~wide, :-2]))
-        if not wide.any():
+        fractions = begin[:, None] + (end - begin)[:, None] * np.concatenate([NODES, ENDS])
+        piece_series = polynomial.map(lambda part, index=step: part[index])
+        series = _at(group, piece_series, length[step][:, None] * fractions, order, pose_type)
+        size, errors = _unresolved(judged(series).reshape(-1, *fractions.shape), step, size)
+        unresolved = (errors > RESOLVED) & ~((errors < BLURRED) & (errors > 0.25 * before))
+        if split == SPLITS or len(step) + np.count_nonzero(unresolved) > MOST_PIECES * count:
+            unresolved[:] = False
+        finished.append(Pieces(step[~unresolved], begin[~unresolved], end[~unresolved], series[..., ~unresolved, :-2]))
+        if not unresolved.any():
             break
-        middle = 0.5 * (begin[wide] + end[wide])
-        begin, end = np.concatenate([begin[wide], middle]), np.concatenate([middle, end[wide]])
-        step, before = np.tile(step[wide], 2), np.tile(left[wide], 2)
-    step, begin, end = (np.concatenate([getattr(part, name) for part in whole]) for name in ("step", "begin", "end"))
-    series, turn = np.concatenate([part.series for part in whole], axis=-2), np.lexsort((begin, step))
+        middle = 0.5 * (begin[unresolved] + end[unresolved])
+        begin, end = np.concatenate([begin[unresolved], middle]), np.concatenate([middle, end[unresolved]])
+        step, before = np.tile(step[unresolved], 2), np.tile(errors[unresolved], 2)
+    step, begin, end = (np.concatenate([getattr(part, name) for part in finished]) for name in ("step", "begin", "end"))
+    series, turn = np.concatenate([part.series for part in finished], axis=-2), np.lexsort((begin, step))
     return Pieces(step[turn], begin[turn], end[turn], series[..., turn, :])
 
 
@@ -223,7 +223,7 @@ def _unresolved(
 
 
 def _at(
-    group: Group, polynomial: State, since: Float[np.ndarray, "piece node"], order: int, pose_type: type
+    group: Group, polynomial: State, elapsed: Float[np.ndarray, "piece node"], order: int, pose_type: type
 ) -> Float[np.ndarray, "levels component instance piece node"]:
     """Return the Taylor coefficients of outputs at times into steps.
 
@@ -232,13 +232,13 @@ def _at(
     """
     count = polynomial.position.shape[1]
     j, k = np.arange(order + 1)[:, None], np.arange(count)
-    powers = since ** np.maximum(k - j, 0)[:, :, None, None]
+    powers = elapsed ** np.maximum(k - j, 0)[:, :, None, None]
     binomials = np.array([[math.comb(b, a) for b in range(count)] for a in range(order + 1)], float)
     weights = binomials[:, :, None, None] * powers
     shifted = (np.einsum("jksn,skcb->jcbsn", weights, part) for part in polynomial)
     coordinates = pose_coordinates(State(*(part.reshape(*part.shape[:3], -1) for part in shifted)))
     (series,) = series_of((group,), coordinates, pose_type)
-    return series.reshape(*series.shape[:3], *since.shape)
+    return series.reshape(*series.shape[:3], *elapsed.shape)
 
 
 class AbstractDetector(abc.ABC):
@@ -261,10 +261,10 @@ class AbstractDetector(abc.ABC):
         for (k, begin, end), coefficients in zip(pieces, (values - self.event.value) @ INTERPOLATION.T, strict=True):
             length = part.length[k]
             for root, direction in crossings(coefficients, first=not self._begun):
-                after, rising = float((begin + root * (end - begin)) * length), float(direction * np.sign(length))
-                again = self._last[1] == rising and abs(part.start[k] + after - self._last[0]) < 2 * EDGE * abs(length)
-                self._last = float(part.start[k] + after), rising
-                if not again and self.event.direction * rising >= 0:
+                after, sense = float((begin + root * (end - begin)) * length), float(direction * np.sign(length))
+                again = self._last[1] == sense and abs(part.start[k] + after - self._last[0]) < 2 * EDGE * abs(length)
+                self._last = float(part.start[k] + after), sense
+                if not again and self.event.direction * sense >= 0:
                     events.append((k, after))
             self._begun = True
         return events

@@ -48,17 +48,17 @@ def uses(program: ClosedJaxpr) -> bool:
 
 def _degrees(jaxpr: Any, arguments: Sequence[int]) -> list[int] | None:
     """Return the degrees of the results in the arguments, zero for constants; None if there is no degree."""
-    known: dict[Any, int] = dict.fromkeys(jaxpr.constvars, 0) | dict(zip(jaxpr.invars, arguments, strict=True))
+    degree_of: dict[Any, int] = dict.fromkeys(jaxpr.constvars, 0) | dict(zip(jaxpr.invars, arguments, strict=True))
 
     def of(variable: Any) -> int:
-        return 0 if isinstance(variable, Literal) else known[variable]
+        return 0 if isinstance(variable, Literal) else degree_of[variable]
 
     for equation in jaxpr.eqns:
         degrees = [of(x) for x in equation.invars]
         degrees_out = [0] * len(equation.outvars) if not any(degrees) else _made(equation, degrees)
         if degrees_out is None:
             return None
-        known.update(zip(equation.outvars, degrees_out, strict=True))
+        degree_of.update(zip(equation.outvars, degrees_out, strict=True))
     return [of(x) for x in jaxpr.outvars]
 
 

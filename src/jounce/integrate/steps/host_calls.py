@@ -70,14 +70,14 @@ def _derivative(function: Callable[[Numbers], Any], shapes: Any, count: int, deg
     slope = function
     for _ in range(degree):
         slope = jax.jacfwd(slope)
-    whole = jax.tree.map(lambda x: jax.ShapeDtypeStruct((*x.shape, *[count] * degree), x.dtype), shapes)
+    result_shapes = jax.tree.map(lambda x: jax.ShapeDtypeStruct((*x.shape, *[count] * degree), x.dtype), shapes)
 
     def on_the_host(vector: Numbers) -> Any:
         return jax.tree.map(np.asarray, slope(jnp.asarray(vector)))
 
     @jax.custom_jvp
     def jvp(vector: Numbers) -> Any:
-        return called_back(on_the_host, whole, vector, vmap_method="sequential")
+        return called_back(on_the_host, result_shapes, vector, vmap_method="sequential")
 
     @jvp.defjvp
     def along(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tuple[Any, Any]:

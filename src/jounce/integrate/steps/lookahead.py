@@ -91,8 +91,8 @@ def constraints_to_watch(
     pose, clock = equations.pose_at_rest(state.position, state.attitude), Jet([time])
     names, first = {}, 0
     for k, group in enumerate(equations.system.groups):
-        bare = law_left_out(group) if group.is_driver else group
-        program = jax.make_jaxpr(lambda pose, clock, bare=bare: bare.residual(pose, clock).coefficients[0])(pose, clock)
+        part = law_left_out(group) if group.is_driver else group
+        program = jax.make_jaxpr(lambda pose, clock, part=part: part.residual(pose, clock).coefficients[0])(pose, clock)
         rows, count = program.out_avals[0].shape[0], group.instances
         if not is_plain(program):
             names[k] = equations.system.row_scale[first : first + rows * count].reshape(rows, count, -1)
@@ -144,11 +144,11 @@ def look_ahead(
     bound = jnp.maximum(bound, HARMLESS)
 
     def seen(part: Any) -> Lookahead:
-        away, moved = signals.departure(part * step, duration, mobility)
-        short = jnp.abs(part * step) <= shortest
-        over = jnp.where(jnp.isfinite(moved), moved / signals.allowed(bound, short), jnp.inf)
-        resolved, index = jnp.all(over <= 1.0, axis=0), jnp.asarray(signals.numbers)[jnp.argmax(over, axis=0)]
-        return Lookahead(part, resolved, jnp.where(jnp.any(away > 0, axis=0), index, -1), index)
+        departure, displacement = signals.departure(part * step, duration, mobility)
+        is_short = jnp.abs(part * step) <= shortest
+        ratio = jnp.where(jnp.isfinite(displacement), displacement / signals.allowed(bound, is_short), jnp.inf)
+        resolved, index = jnp.all(ratio <= 1.0, axis=0), jnp.asarray(signals.numbers)[jnp.argmax(ratio, axis=0)]
+        return Lookahead(part, resolved, jnp.where(jnp.any(departure > 0, axis=0), index, -1), index)
 
     def open_(low: Any, high: Any) -> Any:
         return jnp.where(low > 0, high - low > NEAR * low, high * jnp.abs(step) > 0.25 * shortest)
@@ -156,29 +156,29 @@ def look_ahead(
     def narrowed(carry: Any) -> tuple[Any, ...]:
         low, high, best, is_started = carry
         inside = jnp.where(open_(low, high), jnp.where(low > 0, 0.5 * (low + high), 0.5 * high), low)
-        look = seen(jnp.where(is_started, inside, 1.0))
-        better = look.resolved & (look.step > low)
-        best = jax.tree.map(lambda new, old: jnp.where(better | ~is_started, new, old), look, best)
-        limiting = jnp.where(look.resolved, best.limiting, look.limiting)
-        high = jnp.where(look.resolved, high, look.step)
-        return jnp.where(better, look.step, low), high, best._replace(limiting=limiting), jnp.ones((), bool)
+        result = seen(jnp.where(is_started, inside, 1.0))
+        is_better = result.resolved & (result.step > low)
+        best = jax.tree.map(lambda new, old: jnp.where(is_better | ~is_started, new, old), result, best)
+        limiting = jnp.where(result.resolved, best.limiting, result.limiting)
+        high = jnp.where(result.resolved, high, result.step)
+        return jnp.where(is_better, result.step, low), high, best._replace(limiting=limiting), jnp.ones((), bool)
 
     def unfinished(carry: Any) -> Any:
         low, high, _, is_started = carry
         return ~is_started | jnp.any(open_(low, high))
 
     # the whole step is the first iteration of the loop, so that the large code of `seen` is compiled once
-    none, whole = jnp.zeros(step.shape), jnp.ones(step.shape)
-    nothing = Lookahead(none, jnp.zeros(step.shape, bool), blank, blank)
-    low, high, best, _ = jax.lax.while_loop(unfinished, narrowed, (none, whole, nothing, jnp.zeros((), bool)))
+    none, ones = jnp.zeros(step.shape), jnp.ones(step.shape)
+    blank_result = Lookahead(none, jnp.zeros(step.shape, bool), blank, blank)
+    low, high, best, _ = jax.lax.while_loop(unfinished, narrowed, (none, ones, blank_result, jnp.zeros((), bool)))
     kink = jnp.where(best.resolved, best.kink, -1)
     return Lookahead(step * jnp.where(low > 0, low, high), low > 0, kink, best.limiting)
 
 
 def finest(duration: Numbers, time: Numbers, crossing: Numbers) -> Numbers:
     """Return the allowed length of a step over a jump, s, after `crossing` steps that have not crossed it."""
-    longer = jnp.minimum(FINEST * COARSER ** crossing.astype(float), SHORTEST)
-    return longer * jnp.maximum(duration, jnp.abs(time))
+    fraction = jnp.minimum(FINEST * COARSER ** crossing.astype(float), SHORTEST)
+    return fraction * jnp.maximum(duration, jnp.abs(time))
 
 
 def steps_counted(
@@ -188,8 +188,8 @@ def steps_counted(
 
     A step is short if it is at most `longest` times the duration.
     """
-    short = jnp.abs(step) <= longest * duration
-    return jnp.where(short & count, before + 1, jnp.where(jnp.abs(step) > AWAY * duration, 0, before))
+    is_short = jnp.abs(step) <= longest * duration
+    return jnp.where(is_short & count, before + 1, jnp.where(jnp.abs(step) > AWAY * duration, 0, before))
 
 
 class _Signals:
@@ -215,23 +215,23 @@ class _Signals:
         self._forces = [among_these(group) for group in forces]
         self._joints = [(among_these(group), scale) for group, scale in zip(joints, watched.values(), strict=True)]
         self._path = path.map(lambda part: part[:, :, np.array(bodies, int) - 1])  # of the bodies that these act on
-        first, plain = np.cumsum([0, *counts]), len(forces) + len(drivers)
-        seen = [*range(plain), *(plain + k for k in watched)]
-        self.numbers = np.concatenate([np.arange(first[k], first[k + 1]) for k in seen] + [np.zeros(0, int)])
+        first, law_count = np.cumsum([0, *counts]), len(forces) + len(drivers)
+        group_indices = [*range(law_count), *(law_count + k for k in watched)]
+        self.numbers = np.concatenate([np.arange(first[k], first[k + 1]) for k in group_indices] + [np.zeros(0, int)])
         length = equations.system.column_scale[0]
         steady = [jnp.full(group.instances, 1.0 if is_turning(group.element) else length) for group in drivers]
-        rest = jnp.ones(sum(group.instances for group in joints))
-        free = jnp.full(sum(counts[: len(forces)]), jnp.inf)
-        self._noisiest = jnp.concatenate([free, *(JUMP * part for part in (*steady, rest))])
-        self._split = sum(counts[: len(forces)]), sum(counts[:plain])
+        joint_limits = jnp.ones(sum(group.instances for group in joints))
+        unlimited = jnp.full(sum(counts[: len(forces)]), jnp.inf)
+        self._noisiest = jnp.concatenate([unlimited, *(JUMP * part for part in (*steady, joint_limits))])
+        self._split = sum(counts[: len(forces)]), sum(counts[:law_count])
 
     def allowed(self, bound: Lanes, short: Flags) -> Signals:
         """Return the allowed departures; over the shortest steps forces may jump, laws and joints hardly."""
         forces, laws = self._split
         index = np.arange(len(self.numbers))[:, None]
-        least = jnp.where(index < laws, bound[None], jnp.maximum(MARGIN * bound, GAP)[None])
+        bounds = jnp.where(index < laws, bound[None], jnp.maximum(MARGIN * bound, GAP)[None])
         jump = jnp.where(index < forces, jnp.finfo(float).max, jnp.maximum(JUMP, bound)[None])
-        return jnp.where(short[None], jump, least)
+        return jnp.where(short[None], jump, bounds)
 
     def departure(self, step: Lanes, duration: Number, mobility: BodyMobility) -> tuple[Signals, Signals]:
         """Return the departures of forces and laws from their interpolation, and the displacements that they cause.
@@ -241,26 +241,26 @@ class _Signals:
         """
         points, shakes = (np.concatenate(parts) for parts in zip((NODES, 0.0 * NODES), _SHAKEN, strict=True))
         signals = jax.vmap(lambda s, shake: self._values(s * step, shake))(points, shakes)
-        knots, shaken = signals[: len(NODES)], signals[len(NODES) :]
+        knots, perturbed = signals[: len(NODES)], signals[len(NODES) :]
         coefficients = _combined(INTERPOLATION, knots)
         if self._joints:
-            followed = (np.arange(len(self.numbers)) < self._split[1])[None, None, :, None]
-            coefficients = jnp.where(followed, coefficients, 0.0)
-        least = ROUNDS_OF_JOINTS if self._joints else 1
+            is_followed = (np.arange(len(self.numbers)) < self._split[1])[None, None, :, None]
+            coefficients = jnp.where(is_followed, coefficients, 0.0)
+        fewest = ROUNDS_OF_JOINTS if self._joints else 1
         rounds_needed = jnp.max(jnp.where(duration > 0, jnp.abs(step) / duration, 0.0)) * (RUN_POINTS / POINTS)
-        rounds = jnp.clip(jnp.ceil(rounds_needed), least, RUN_POINTS // POINTS)
+        rounds = jnp.clip(jnp.ceil(rounds_needed), fewest, RUN_POINTS // POINTS)
         count = rounds * POINTS
         size = jnp.max(jnp.abs(knots), axis=0)
-        shaken = jnp.abs(shaken.reshape(2, -1, *shaken.shape[1:]) - knots[None, ::SPARSE])
-        noise = NOISE * jnp.max(jnp.min(shaken, axis=0), axis=0) + FAINT * size
+        perturbed = jnp.abs(perturbed.reshape(2, -1, *perturbed.shape[1:]) - knots[None, ::SPARSE])
+        noise = NOISE * jnp.max(jnp.min(perturbed, axis=0), axis=0) + FAINT * size
         noise = jnp.minimum(noise, self._noisiest[None, :, None])  # a jump at a node is no rounding
 
         def look(k: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
-            share = (k * POINTS + jnp.arange(POINTS)).astype(float) / (count - 1.0)  # both ends too
-            signals = jax.vmap(lambda s: self._values(s * step, 0.0))(share)
-            away = jnp.abs(signals - _combined(_chebyshev(2.0 * share - 1.0).T, coefficients))
-            away = jnp.maximum(away - jnp.maximum(noise[None], FAINT * jnp.abs(signals)), 0.0)
-            return jnp.maximum(carry[0], jnp.max(away, axis=0)), carry[1] + jnp.sum(away, axis=0)
+            fractions = (k * POINTS + jnp.arange(POINTS)).astype(float) / (count - 1.0)  # both ends too
+            signals = jax.vmap(lambda s: self._values(s * step, 0.0))(fractions)
+            gap = jnp.abs(signals - _combined(_chebyshev(2.0 * fractions - 1.0).T, coefficients))
+            gap = jnp.maximum(gap - jnp.maximum(noise[None], FAINT * jnp.abs(signals)), 0.0)
+            return jnp.maximum(carry[0], jnp.max(gap, axis=0)), carry[1] + jnp.sum(gap, axis=0)
 
         largest, total = jax.lax.fori_loop(0, rounds.astype(int), look, (jnp.zeros_like(size), jnp.zeros_like(size)))
         largest, mean = jnp.max(largest, axis=0), jnp.max(total, axis=0) / count
@@ -270,9 +270,9 @@ class _Signals:
         """Return the displacements of bodies by departures of forces, from their impulses in N s^2, and of laws."""
         length, parts, first = self._equations.system.column_scale[0], [], 0
         for group in self._given:
-            reached = jnp.max(jnp.stack([mobility[np.array(slot)] for slot in group.bodies]), axis=0)
+            response = jnp.max(jnp.stack([mobility[np.array(slot)] for slot in group.bodies]), axis=0)
             lever = length if group.element.unit == "N" else 1.0
-            parts.append(impulse[first : first + group.instances] * reached * lever)
+            parts.append(impulse[first : first + group.instances] * response * lever)
             first += group.instances
         for group in self._drivers:
             departure = largest[first : first + group.instances]
@@ -280,28 +280,28 @@ class _Signals:
             first += group.instances
         return jnp.concatenate([*parts, largest[first:]])
 
-    def _values(self, since: Lanes, shake: Float[Numbers, ""] | float) -> Float[Numbers, "component instance batch"]:
+    def _values(self, elapsed: Lanes, shake: Float[Numbers, ""] | float) -> Float[Numbers, "component instance batch"]:
         """Return the watched values at a time from the beginning of the step.
 
         With `shake`, time and all coordinates have relative changes of this size, with different signs.
         """
-        lanes = since.shape[-1]
-        clock = Jet.variable(((self._time + since) * (1.0 + shake))[None], 1)
+        lanes = elapsed.shape[-1]
+        clock = Jet.variable(((self._time + elapsed) * (1.0 + shake))[None], 1)
         parts: list[Any] = []
         pose: Any = None
         if self._forces or self._joints:
-            state = evaluated(self._path, since).map(lambda part: part * (1.0 + shake * _signs(part.shape[:2])))
+            state = evaluated(self._path, elapsed).map(lambda part: part * (1.0 + shake * _signs(part.shape[:2])))
             pose = self._equations.pose(state)
         if self._forces:
-            forces = with_turns(self._forces, self._angles.at(since))
+            forces = with_turns(self._forces, self._angles.at(elapsed))
             parts += [group.force(pose, clock).coefficients[0] for group in forces]
         for group in self._drivers:
             law = group.element.motion(clock).coefficients[0]
             parts.append(jnp.broadcast_to(law, (group.instances, lanes))[None])
         for group, scale in self._joints:
             parts.append(group.residual(pose.truncate(0), clock.truncate(0)).coefficients[0] * scale)
-        most = max(len(part) for part in parts)
-        padded = [jnp.pad(part, ((0, most - len(part)), (0, 0), (0, 0))) for part in parts]
+        row_count = max(len(part) for part in parts)
+        padded = [jnp.pad(part, ((0, row_count - len(part)), (0, 0), (0, 0))) for part in parts]
         return jnp.concatenate([jnp.broadcast_to(p, (*p.shape[:2], lanes)) for p in padded], axis=1)
 
 

@@ -78,11 +78,11 @@ class Obreshkov(AbstractMethod):
     def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
         """Return the end that satisfies the formula, NaN if the iteration does not converge."""
         measure = _measure(equations.system.column_scale[0], step)
-        later = (time + step)[None]
+        end_time = (time + step)[None]
         known = _known(expansion, step, self.derivatives_used)
 
         def improved(end: State) -> State:
-            state = expand(equations, end, later, self.derivatives_used).state
+            state = expand(equations, end, end_time, self.derivatives_used).state
             return State(*(a - _terms(c, -step, self.derivatives_used) for a, c in zip(known, state, strict=True)))
 
         def iterate(carry: Any) -> Any:
@@ -98,8 +98,8 @@ class Obreshkov(AbstractMethod):
         start = evaluated(expansion.state, step)
         infinite = jnp.full(step.shape, jnp.inf)
         end, change, before, _ = jax.lax.while_loop(unfinished, iterate, (start, infinite, infinite, 0))
-        good = _has_converged(change, before) & jnp.isfinite(change)
-        return end.map(lambda x: jnp.where(good, x, jnp.nan))
+        converged = _has_converged(change, before) & jnp.isfinite(change)
+        return end.map(lambda x: jnp.where(converged, x, jnp.nan))
 
     def polynomial(self, start: Expansion, end: Expansion, step: Lanes) -> State:
         """Return the polynomial of degree order + 1 with the derivatives of the formula at both ends."""
@@ -111,8 +111,8 @@ class Obreshkov(AbstractMethod):
             power = length[None, None, None] ** jnp.arange(2.0 * count)[:, None, None, None]
             low, high = c0[:count] * power[:count], c1[:count] * power[:count]
             ends = jnp.concatenate([(high - low)[:1], low[1:], high[1:]])
-            rest = jnp.sum(upper.reshape(*upper.shape, 1, 1, 1) * ends[None], axis=1)
-            return jnp.concatenate([c0[:count], rest / power[count:]])
+            upper_terms = jnp.sum(upper.reshape(*upper.shape, 1, 1, 1) * ends[None], axis=1)
+            return jnp.concatenate([c0[:count], upper_terms / power[count:]])
 
         return State(*map(joined, start.state, end.state))
 
@@ -159,8 +159,8 @@ def _hermite(p: int) -> np.ndarray:
 
 def _measure(length: Number, step: Lanes) -> tuple[Any, ...]:
     """Return the factors that turn positions, attitudes, velocities and spins into rad or sizes of the mechanism."""
-    lapse = jnp.abs(step)
-    return 1.0 / length, 1.0, lapse[None, None] / length, lapse[None, None]
+    duration = jnp.abs(step)
+    return 1.0 / length, 1.0, duration[None, None] / length, duration[None, None]
 
 
 def _size(change: State, measure: tuple[Any, ...]) -> Lanes:

@@ -54,25 +54,25 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
 
     def iterate(carry: Any) -> Any:
         position, attitude, _, last, first, count, _ = carry
-        near = ~jnp.any((last > 1e-9) & jnp.isfinite(last)) | (count >= MOST_ITERATIONS)
-        inverting = near & (count > 0)  # one more factorization; a branch for it would be compiled twice
+        is_near = ~jnp.any((last > 1e-9) & jnp.isfinite(last)) | (count >= MOST_ITERATIONS)
+        inverting = is_near & (count > 0)  # one more factorization; a branch for it would be compiled twice
         factor, gap = correction(position, attitude)
         column = equations.least_change(factor, gap)
         size = jnp.where(inverting, last, jnp.max(jnp.abs(column), axis=0))
         moved_pose = [
             jnp.where(inverting, x, y) for x, y in zip(carry[:2], moved(position, attitude, column), strict=True)
         ]
-        known = inverting | jnp.all(size <= CLOSE)
-        return *moved_pose, factor, size, jnp.where(count == 0, size, first), count + 1, known
+        is_done = inverting | jnp.all(size <= CLOSE)
+        return *moved_pose, factor, size, jnp.where(count == 0, size, first), count + 1, is_done
 
     start = (position, attitude, equations.blank_factor(lanes), jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0, False)
     position, attitude, factor, last, first, *_ = jax.lax.while_loop(lambda carry: ~carry[-1], iterate, start)
-    moving = equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
+    result = equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
     fulfilled = last <= 1e-9
     if equations.system.rank is not None:
         gap = equations.system.residual(equations.pose_at_rest(position, attitude), clock).coefficients[0]
         fulfilled &= jnp.max(jnp.abs(gap), axis=0) <= LARGEST_GAP
-    return moving, jnp.where(fulfilled, first, jnp.inf), inverted(factor)
+    return result, jnp.where(fulfilled, first, jnp.inf), inverted(factor)
 
 
 def normalized(attitude: Attitudes) -> Attitudes:

@@ -40,13 +40,13 @@ class Angles(NamedTuple):
     samples: tuple[Float[Numbers, "point _ batch"], ...]
     step: Lanes
 
-    def at(self, since: Lanes) -> AnglesOfForces:
+    def at(self, elapsed: Lanes) -> AnglesOfForces:
         """Return the angles at a time from the beginning, (instances, batch) each, to within half a turn."""
         if not self.samples:
             return ()
-        share = jnp.clip(since / jnp.where(self.step == 0.0, 1.0, self.step), 0.0, 1.0)
-        away = jnp.abs(share[None] * POINTS_IN_STEP - jnp.arange(POINTS_IN_STEP + 1.0)[:, None])
-        weights = jnp.maximum(1.0 - away, 0.0)[:, None]
+        fraction = jnp.clip(elapsed / jnp.where(self.step == 0.0, 1.0, self.step), 0.0, 1.0)
+        distance = jnp.abs(fraction[None] * POINTS_IN_STEP - jnp.arange(POINTS_IN_STEP + 1.0)[:, None])
+        weights = jnp.maximum(1.0 - distance, 0.0)[:, None]
         return tuple(jnp.sum(weights * angles, axis=0) for angles in self.samples)
 
 
@@ -81,19 +81,19 @@ def followed(equations: Equations, angles: AnglesOfForces, path: State, step: La
     if not angles:
         return Angles((), step)
 
-    def follow_angles(near: Any, share: Any) -> tuple[Any, Any]:
-        following = measured(equations.near(near), evaluated(path, share * step))
-        return following, following
+    def follow_angles(previous: Any, fraction: Any) -> tuple[Any, Any]:
+        current = measured(equations.near(previous), evaluated(path, fraction * step))
+        return current, current
 
-    _, following = jax.lax.scan(follow_angles, angles, jnp.arange(1.0, POINTS_IN_STEP + 1) / POINTS_IN_STEP)
-    return Angles(tuple(jnp.concatenate([a[None], b]) for a, b in zip(angles, following, strict=True)), step)
+    _, current = jax.lax.scan(follow_angles, angles, jnp.arange(1.0, POINTS_IN_STEP + 1) / POINTS_IN_STEP)
+    return Angles(tuple(jnp.concatenate([a[None], b]) for a, b in zip(angles, current, strict=True)), step)
 
 
 def attitudes_at(
-    series: Float[Numbers, "place order 4 bodies"], since: Float[np.ndarray, " place"]
+    series: Float[Numbers, "place order 4 bodies"], elapsed: Float[np.ndarray, " place"]
 ) -> Float[np.ndarray, "4 bodies+1 place"]:
     """Return the Euler parameters of all bodies, the ground first, at times into steps given by Taylor coefficients."""
-    attitudes = polyval(since[:, None, None], np.swapaxes(series, 0, 1), tensor=False)
+    attitudes = polyval(elapsed[:, None, None], np.swapaxes(series, 0, 1), tensor=False)
     return np.asarray(turns_with_ground(np.moveaxis(attitudes, 0, -1)))
 
 
@@ -104,10 +104,10 @@ def attitudes_along(
 
     The steps are consecutive, and given by Taylor coefficients.
     """
-    known = np.asarray(series).reshape(*series.shape[:2], -1)
+    flat = np.asarray(series).reshape(*series.shape[:2], -1)
     with np.errstate(over="ignore"):  # powers of long steps, in which bodies turn uniformly
         powers = length[:, None, None] ** np.arange(series.shape[1])[:, None]
-    terms = np.multiply(known, powers, where=known != 0, out=np.zeros_like(known))
-    shares = (np.arange(points)[:, None] / points) ** np.arange(series.shape[1])
-    attitudes = np.concatenate([(shares @ terms).reshape(-1, known.shape[-1]), terms[-1:].sum(axis=1)])
+    terms = np.multiply(flat, powers, where=flat != 0, out=np.zeros_like(flat))
+    fractions = (np.arange(points)[:, None] / points) ** np.arange(series.shape[1])
+    attitudes = np.concatenate([(fractions @ terms).reshape(-1, flat.shape[-1]), terms[-1:].sum(axis=1)])
     return np.asarray(turns_with_ground(np.moveaxis(attitudes.reshape(-1, *series.shape[2:]), 0, -1)))

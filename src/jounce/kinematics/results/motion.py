@@ -337,8 +337,8 @@ class Motion(Tabulated):
             return coefficients
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
             angles = np.where(self.status == Status.OK, coefficients[0, :, k], np.nan)
-            between = history.sampled(lambda q, b=bodies: euler_angles_of(element.sequence, attitudes_of(b, q)))
-            coefficients[0, :, k] = continued(element, angles, self.time, between)
+            samples = history.sampled(lambda q, b=bodies: euler_angles_of(element.sequence, attitudes_of(b, q)))
+            coefficients[0, :, k] = continued(element, angles, self.time, samples)
         return coefficients
 
     @property
