@@ -248,9 +248,9 @@ class RoundRunner:
         result = _pairs(results, iter(offsets), width, len(sources))
         self._counts = len(at_source), len(at_target), len(result)
         starts = (offsets[k] + width * ENTRY * n for k, x in zip(links, linked, strict=True) for n in range(x.size))
-        carried = [(offset, given) for offset, (_, given) in zip(starts, at_source, strict=True)]
-        self._pairs = np.array([*carried, *at_source, *at_target, *result], np.int64).reshape(-1, 2)
-        self._within = np.array([[1, 1]] * len(carried) + [[0, 1]] * (len(self._pairs) - len(carried)))
+        copies = [(offset, given) for offset, (_, given) in zip(starts, at_source, strict=True)]
+        self._pairs = np.array([*copies, *at_source, *at_target, *result], np.int64).reshape(-1, 2)
+        self._within = np.array([[1, 1]] * len(copies) + [[0, 1]] * (len(self._pairs) - len(copies)))
 
     def __call__(self, targets: Int[np.ndarray, "round lane"]) -> None:
         """Solve the instants of given indices; several threads may solve disjoint instants at once.

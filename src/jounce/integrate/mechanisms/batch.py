@@ -335,9 +335,11 @@ class _Runs:
             time = self.instants[instant_indices[lanes]]
             elapsed = time - starts[lanes]
             motion = turned_by, polynomial.map(lambda part, lanes=lanes: part[..., lanes]), elapsed, time
-            found, backend = mapped_runs(outputs_of_runs, self._made, runs[lanes], (), (motion,), order=self._expansion)
+            results, backend = mapped_runs(
+                outputs_of_runs, self._made, runs[lanes], (), (motion,), order=self._expansion
+            )
             self.backends.add(backend)
-            for index, series in enumerate(map(np.array, found)):
+            for index, series in enumerate(map(np.array, results)):
                 if index in self._turns:
                     series[0, 0] = shifted_by_turns(series[0, 0], before[index][:, lanes])
                 elif index in before:
