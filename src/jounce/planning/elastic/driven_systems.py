@@ -74,8 +74,8 @@ class DrivenRobot(DrivenSystem):
         """Return the coordinates and forces of the joints."""
         q = self.followed.coordinates(times, levels + 1)
 
-        def block(some: np.ndarray) -> np.ndarray:
-            return np.asarray(link_forces(self.robot, q[some], self.losses))
+        def block(chunk: np.ndarray) -> np.ndarray:
+            return np.asarray(link_forces(self.robot, q[chunk], self.losses))
 
         return q[:, :levels], in_chunks(block, len(times), (BLOCK,), axis=0)[:, :levels]
 
@@ -153,19 +153,19 @@ class DrivenMechanism(DrivenSystem):
 
     def moved(self, times: Float[np.ndarray, " time"], levels: int) -> Moved:
         """Return the coordinates and forces of the drivers; each call solves the motion from its start."""
-        known = _filled_up(np.union1d(self.instants, times))
-        indices = np.searchsorted(known, times)
-        motion = solve(self.mechanism, known, order=levels + 1)
-        each = [(motion.driver(name), driver_force(motion, name)) for name in self.arrays.names]
-        for name, (_, force) in zip(self.arrays.names, each, strict=True):
+        instants = _filled_up(np.union1d(self.instants, times))
+        indices = np.searchsorted(instants, times)
+        motion = solve(self.mechanism, instants, order=levels + 1)
+        results = [(motion.driver(name), driver_force(motion, name)) for name in self.arrays.names]
+        for name, (_, force) in zip(self.arrays.names, results, strict=True):
             if not np.isfinite(force.values).all():
                 message = f"its force is not determined: {force.attrs.get('comment', 'it is not finite')}"
                 raise MechanismError(message, name=f"drivers.{name}")
-        q, force = (np.stack([pair[k].values[indices, :levels] for pair in each], axis=-1) for k in (0, 1))
+        q, force = (np.stack([pair[k].values[indices, :levels] for pair in results], axis=-1) for k in (0, 1))
         return q, force
 
 
 def _filled_up(times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " more"]:
     """Return instants with midpoints added up to a power of two, so that few sizes are compiled."""
-    missing = power_of_two(len(times)) - len(times)
-    return np.union1d(times, 0.5 * (times[:-1] + times[1:])[:missing])
+    count = power_of_two(len(times)) - len(times)
+    return np.union1d(times, 0.5 * (times[:-1] + times[1:])[:count])

@@ -180,11 +180,11 @@ class DriveArrays:
             if drive.lead is not None and turning[names.index(name)]:
                 message = "is for joints and drivers that slide; this one turns, give a gear_ratio"
                 raise RobotError(message, name=f"drives.{name}.lead", value=drive.lead)
-        each = [drives.get(name, Drive()) for name in names]
+        entries = [drives.get(name, Drive()) for name in names]
         inertia = [
-            a if x.reflected_inertia is None else x.reflected_inertia for x, a in zip(each, armature, strict=True)
+            a if x.reflected_inertia is None else x.reflected_inertia for x, a in zip(entries, armature, strict=True)
         ]
-        limits = [[x.deflection_limit, x.velocity_limit, x.torque_limit] for x in each]
+        limits = [[x.deflection_limit, x.velocity_limit, x.torque_limit] for x in entries]
 
         def array(values: Sequence[Any]) -> np.ndarray:
             return np.array(values, float).reshape(len(names))
@@ -192,12 +192,12 @@ class DriveArrays:
         return cls(
             tuple(names),
             tuple(map(bool, turning)),
-            tuple(bool(t) or x.lead is not None for x, t in zip(each, turning, strict=True)),
-            array([np.inf if x.stiffness is None else x.stiffness for x in each]),
-            array([x.time_constant for x in each]),
+            tuple(bool(t) or x.lead is not None for x, t in zip(entries, turning, strict=True)),
+            array([np.inf if x.stiffness is None else x.stiffness for x in entries]),
+            array([x.time_constant for x in entries]),
             array(inertia),
             np.asarray(friction, float),
-            array([x.ratio for x in each]),
+            array([x.ratio for x in entries]),
             np.array(limits, float).reshape(len(names), 3).T,  # None becomes NaN
         )
 

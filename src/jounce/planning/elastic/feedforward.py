@@ -120,18 +120,18 @@ def feedforward(
         raise JounceError(f"must be at most {MOST_RATES}", name="rates", value=rates)
     if isinstance(system, Mechanism):
         check_mechanism(system)
-        driven = DrivenMechanism(system, motion if times is None else times, drives)
-        return _along(driven, driven.instants, rates)
+        driven_mechanism = DrivenMechanism(system, motion if times is None else times, drives)
+        return _along(driven_mechanism, driven_mechanism.instants, rates)
     if not isinstance(system, Robot):
         raise JounceError("must be a Robot or a Mechanism", name="system", value=type(system).__name__)
     if not isinstance(motion, JointTrajectory):
         if times is not None:
             raise RobotError("belongs to a trajectory; derivatives are given as they are", name="times")
         return _of_derivatives(system, motion, drives, rates, losses, tolerance)
-    followed = DrivenRobot(system, motion, drives, losses)
+    driven_robot = DrivenRobot(system, motion, drives, losses)
     instants = motion.times if times is None else _checked_times(times, motion)
-    result = _along(followed, instants, rates)
-    followed.warn()
+    result = _along(driven_robot, instants, rates)
+    driven_robot.warn()
     return result
 
 
@@ -153,25 +153,25 @@ def _of_derivatives(robot: Robot, q: object, drives: object, rates: int, losses:
     arrays, levels = robot_drives(robot, drives, losses), 3 + rates
     q = np.asarray(checked_coordinates(robot, q, levels + 1))
     forces = np.asarray(link_forces(robot, q, losses))
-    known = forces.shape[-2]
+    level_count = forces.shape[-2]
     deflection = forces[..., :levels, :] / arrays.stiffness
-    last = np.zeros_like(deflection)
-    for k in range(known):  # terms of the regular expansion
-        count = min(levels, known - k)
+    last_terms = np.zeros_like(deflection)
+    for k in range(level_count):  # terms of the regular expansion
+        count = min(levels, level_count - k)
         term = (-arrays.time_constant) ** k * forces[..., k : k + count, :] / arrays.stiffness
         deflection[..., :count, :] += term if k else 0.0
-        last[..., :count, :] = np.abs(term)
+        last_terms[..., :count, :] = np.abs(term)
     damped = np.where(arrays.time_constant > 0, 1.0, 0.0)
     n = len(arrays.names)
-    peaks = [np.abs(x).reshape(-1, levels, n).max(axis=0) for x in (last * damped, deflection)]
+    peaks = [np.abs(x).reshape(-1, levels, n).max(axis=0) for x in (last_terms * damped, deflection)]
     rounding = 1e-9 * peaks[1].max(axis=1, keepdims=True)
-    share = peaks[0] / np.maximum(np.maximum(peaks[1], rounding), 1e-300)
-    if (share > tolerance).any():
-        level, joint = np.unravel_index(np.argmax(share), share.shape)
-        what = f"derivative {level} of the deflection" if level else "the deflection"
+    ratios = peaks[0] / np.maximum(np.maximum(peaks[1], rounding), 1e-300)
+    if (ratios > tolerance).any():
+        level, joint = np.unravel_index(np.argmax(ratios), ratios.shape)
+        noun = f"derivative {level} of the deflection" if level else "the deflection"
         message = (
             f"the expansion in its time constant, {arrays.time_constant[joint]:.3g} s, still has a term of "
-            f"{share[level, joint]:.3g} of {what} where it ends; give a trajectory, along which it is solved, or more "
+            f"{ratios[level, joint]:.3g} of {noun} where it ends; give a trajectory, along which it is solved, or more "
             "derivatives, or a larger tolerance"
         )
         raise RobotError(message, name=f"drives.{arrays.names[joint]}.damping")

@@ -79,18 +79,20 @@ def link_errors(feedforward: Feedforward, *, rigid: bool = True) -> LinkErrors:
 
 def _of_robot(system: DrivenRobot, feedforward: Feedforward, instants: np.ndarray, laws: Any) -> np.ndarray:
     options: Any = {"losses": system.losses, "friction": False, "strict": False}
-    run = simulate_elastic(system.robot, system.drives, instants, laws, feedforward.start, order=1, **options)
-    columns = [run.robot.joint_names.index(name) for name in feedforward.names]
-    return np.abs(run.q[:, 0, columns] - feedforward.at(instants).q[:, 0])
+    result = simulate_elastic(system.robot, system.drives, instants, laws, feedforward.start, order=1, **options)
+    columns = [result.robot.joint_names.index(name) for name in feedforward.names]
+    return np.abs(result.q[:, 0, columns] - feedforward.at(instants).q[:, 0])
 
 
 def _of_mechanism(system: DrivenMechanism, feedforward: Feedforward, instants: np.ndarray, laws: Any) -> np.ndarray:
-    run = simulate_elastic(system.mechanism, system.drives, instants, laws, feedforward.start, order=1, strict=False)
+    result = simulate_elastic(system.mechanism, system.drives, instants, laws, feedforward.start, order=1, strict=False)
     ideal = solve(system.mechanism, instants, order=1)
     size = 2 if system.mechanism.space == "planar" else 3
     points = np.concatenate([np.zeros((1, size)), np.eye(size)]).tolist()
     deviations = np.zeros((len(instants), len(system.mechanism.bodies)))
     for column, body in enumerate(system.mechanism.bodies):
-        differences = [run.point(body, point).values[:, 0] - ideal.point(body, point).values[:, 0] for point in points]
+        differences = [
+            result.point(body, point).values[:, 0] - ideal.point(body, point).values[:, 0] for point in points
+        ]
         deviations[:, column] = np.linalg.norm(np.stack(differences), axis=-1).max(axis=0)
     return deviations

@@ -97,12 +97,12 @@ def simulate_elastic_mechanism(
         raise UnsupportedError(
             "feedback of motors is for robots; give laws of time for those of mechanisms", name="torque"
         )
-    known: dict[int, Any] = dict(laws)
-    torques = [known.get(k, float(value)) for k, value in enumerate(constant)]
-    whole = _elastic(
+    motor_laws: dict[int, Any] = dict(laws)
+    torques = [motor_laws.get(k, float(value)) for k, value in enumerate(constant)]
+    elastic_mechanism = _elastic(
         mechanism, arrays, torques, _start(mechanism, arrays, state, float(instants[0])), float(instants[0])
     )
-    return simulate(whole, instants, order, **options)
+    return simulate(elastic_mechanism, instants, order, **options)
 
 
 def _start(mechanism: Mechanism, arrays: DriveArrays, state: object, instant: float) -> np.ndarray:
@@ -110,8 +110,8 @@ def _start(mechanism: Mechanism, arrays: DriveArrays, state: object, instant: fl
     n = len(arrays.names)
     if state is None:
         motion = solve(mechanism, [instant], order=1)
-        own = np.stack([motion.driver(name).values[0] for name in arrays.names], axis=-1)
-        return np.stack([own, own])
+        law_values = np.stack([motion.driver(name).values[0] for name in arrays.names], axis=-1)
+        return np.stack([law_values, law_values])
     labels = in_order("state", state, arrays.names, MechanismError, "drivers")
     given_state = real_numbers("state", labels, MechanismError)
     if given_state.shape != (2, 2, n) or not np.isfinite(given_state).all():
@@ -125,7 +125,7 @@ def _elastic(
 ) -> Mechanism:
     bodies, joints, forces = dict(mechanism.bodies), dict(mechanism.joints), dict(mechanism.forces)
     remaining, initial = dict(mechanism.drivers), dict(mechanism.initial)
-    across, normal = _across(mechanism)
+    axis, normal = _across(mechanism)
     for k in np.flatnonzero(arrays.elastic):
         name, spring = arrays.names[k], arrays.stiffness[k]
         driver, rotor = remaining.pop(name), arrays.names[k] + MOTOR
@@ -142,19 +142,19 @@ def _elastic(
         values = {field: getattr(driver, field) for field in fields if field != "bodies"}
         if "ratio" in values and values["ratio"] is None:
             values["ratio"] = 1.0
-        given = {"stiffness": spring, "damping": spring * arrays.time_constant[k], "across": across, **values}
-        forces[f"{name}_spring"] = kind(bodies=(*driver.bodies, rotor), **given)
-        zero, coordinate = [0.0] * len(across), [float(c * state[1, 0, k]) for c in across]
-        bodies[rotor] = Body(coordinate, mass=float(arrays.inertia[k]), inertia=1.0 if len(across) == 2 else [1.0] * 3)
-        directions = (across, across) if len(across) == 2 else (across, across, normal, normal)
-        slider = planar.Prismatic if len(across) == 2 else spatial.Prismatic
+        options = {"stiffness": spring, "damping": spring * arrays.time_constant[k], "across": axis, **values}
+        forces[f"{name}_spring"] = kind(bodies=(*driver.bodies, rotor), **options)
+        zero, coordinate = [0.0] * len(axis), [float(c * state[1, 0, k]) for c in axis]
+        bodies[rotor] = Body(coordinate, mass=float(arrays.inertia[k]), inertia=1.0 if len(axis) == 2 else [1.0] * 3)
+        directions = (axis, axis) if len(axis) == 2 else (axis, axis, normal, normal)
+        slider = planar.Prismatic if len(axis) == 2 else spatial.Prismatic
         joints[f"{rotor}_guide"] = slider(("ground", rotor), zero, zero, *directions)
         law = torques[k]
         acting = TimeLaw(law) if isinstance(law, AbstractMotion) else ExpressionLaw(repr(float(law)))
-        forces[f"{rotor}_torque"] = SlideForce(("ground", rotor), zero, zero, across, acting)
-        slide = drivers.SlideDriver if len(across) == 2 else drivers.SpatialSlideDriver
+        forces[f"{rotor}_torque"] = SlideForce(("ground", rotor), zero, zero, axis, acting)
+        slide = drivers.SlideDriver if len(axis) == 2 else drivers.SpatialSlideDriver
         initial[name] = dataclasses.replace(driver, motion=_uniform(state[0, :, k], instant))
-        initial[rotor] = slide(("ground", rotor), zero, zero, across, _uniform(state[1, :, k], instant))
+        initial[rotor] = slide(("ground", rotor), zero, zero, axis, _uniform(state[1, :, k], instant))
     changed = {"bodies": bodies, "joints": joints, "forces": forces, "drivers": remaining, "initial": initial}
     outputs = {name: x for name, x in mechanism.outputs.items() if not _of_driver(x, remaining, arrays.names)}
     return dataclasses.replace(mechanism, **changed, outputs=outputs)
@@ -174,13 +174,13 @@ def _uniform(state: np.ndarray, instant: float) -> str:
 def _across(mechanism: Mechanism) -> tuple[list[float], list[float]]:
     """Return a unit vector perpendicular to gravity, and one perpendicular to that vector."""
     plane = mechanism.space == "planar"
-    given = [0.0] * (2 if plane else 3) if mechanism.gravity is None else mechanism.gravity
-    gravity = np.array([float(resolve(g, mechanism.parameter_values)) for g in given])
+    components = [0.0] * (2 if plane else 3) if mechanism.gravity is None else mechanism.gravity
+    gravity = np.array([float(resolve(g, mechanism.parameter_values)) for g in components])
     if plane:
-        across = np.array([gravity[1], -gravity[0]]) if gravity.any() else np.array([1.0, 0.0])
-        return (across / np.linalg.norm(across)).tolist(), []
+        direction = np.array([gravity[1], -gravity[0]]) if gravity.any() else np.array([1.0, 0.0])
+        return (direction / np.linalg.norm(direction)).tolist(), []
     axis = np.eye(3)[np.argmin(np.abs(gravity))]
-    across = np.cross(gravity, axis) if gravity.any() else axis
-    across = across / np.linalg.norm(across)
-    other = np.cross(across, np.eye(3)[np.argmin(np.abs(across))])
-    return across.tolist(), (other / np.linalg.norm(other)).tolist()
+    direction = np.cross(gravity, axis) if gravity.any() else axis
+    direction = direction / np.linalg.norm(direction)
+    normal = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
+    return direction.tolist(), (normal / np.linalg.norm(normal)).tolist()

@@ -66,19 +66,19 @@ def motor_motion(
     q: Float[np.ndarray, "*batch level joint"],
     forces: Float[np.ndarray, "*batch level joint"],
     deflection: Float[np.ndarray, "*batch level joint"],
-    rest: Any = 0.0,
+    rest_speed: Any = 0.0,
 ) -> MotorMotion:
     """Return the motion of motors: positions from deflections, torques from forces and rotor inertias.
 
     Parameters
     ----------
-    rest : array of shape (joints,)
+    rest_speed : array of shape (joints,)
         Velocities up to which a motor counts as at rest, without friction.
     """
     position = q + deflection
     torque = forces[..., :-2, :] + arrays.inertia * position[..., 2:, :]
     velocity = position[..., 1, :]
-    torque[..., 0, :] += arrays.friction * np.where(np.abs(velocity) > rest, np.sign(velocity), 0.0)
+    torque[..., 0, :] += arrays.friction * np.where(np.abs(velocity) > rest_speed, np.sign(velocity), 0.0)
     return MotorMotion(
         arrays.names, q, forces, deflection, position, torque, arrays.ratio * position, torque / arrays.ratio
     )
@@ -143,9 +143,9 @@ class Feedforward(MotorMotion, Displayed):
         TrajectoryError
             If an instant lies outside of the trajectory.
         """
-        instants, known = np.atleast_1d(seconds("times", times, TrajectoryError)), self.system.instants
-        if not (instants.ndim == 1 and ((instants >= known[0]) & (instants <= known[-1])).all()):
-            message = f"must be instants from {known[0]:.9g} to {known[-1]:.9g} s, where the motion is known"
+        instants, grid = np.atleast_1d(seconds("times", times, TrajectoryError)), self.system.instants
+        if not (instants.ndim == 1 and ((instants >= grid[0]) & (instants <= grid[-1])).all()):
+            message = f"must be instants from {grid[0]:.9g} to {grid[-1]:.9g} s, where the motion is known"
             raise TrajectoryError(message, name="times", value=instants.tolist()[:5])
         return Feedforward(self.system, instants, self._levels, self._springs, self._rest)
 
@@ -172,8 +172,8 @@ class Feedforward(MotorMotion, Displayed):
         """Deflections, motor velocities and motor torques at their worst instants, with their limits."""
         grid = self.system.instants
         steps = max(1, -(-INSTANTS // (len(grid) - 1)))
-        between = grid[:-1, None] + np.diff(grid)[:, None] * (np.arange(steps) / steps)
-        grid = np.append(between.reshape(-1), grid[-1])
+        evenly_spaced = grid[:-1, None] + np.diff(grid)[:, None] * (np.arange(steps) / steps)
+        grid = np.append(evenly_spaced.reshape(-1), grid[-1])
         rigid = [QUANTITIES.index("deflection")] if not self._arrays.elastic.all() else []
         limited = [
             (quantity, joint)
@@ -185,8 +185,8 @@ class Feedforward(MotorMotion, Displayed):
         times, values, _ = worst_instants(self._curves, bounds, grid, self._curves(grid), np.array(limited))
         return DriveReport(
             tuple(
-                self._row(quantity, joint, float(at), float(value))
-                for (quantity, joint), at, value in zip(limited, times, values, strict=True)
+                self._row(quantity, joint, float(time), float(value))
+                for (quantity, joint), time, value in zip(limited, times, values, strict=True)
             )
         )
 
@@ -196,13 +196,13 @@ class Feedforward(MotorMotion, Displayed):
 
     def _row(self, quantity: int, joint: int, time: float, value: float) -> LimitRow:
         limit = float(self._arrays.limits[quantity, joint])
-        turning = (self._arrays.turning if quantity == 0 else self._arrays.motor_turning)[joint]
-        unit = (("m", "m/s", "N"), ("rad", "rad/s", "N m"))[turning][quantity]
-        word = QUANTITIES[quantity] if turning else QUANTITIES[quantity].replace("torque", "force")
+        is_turning = (self._arrays.turning if quantity == 0 else self._arrays.motor_turning)[joint]
+        unit = (("m", "m/s", "N"), ("rad", "rad/s", "N m"))[is_turning][quantity]
+        quantity_name = QUANTITIES[quantity] if is_turning else QUANTITIES[quantity].replace("torque", "force")
         if np.isnan(limit):
-            return LimitRow(self.names[joint], word, unit, value, time)
+            return LimitRow(self.names[joint], quantity_name, unit, value, time)
         return LimitRow(
-            self.names[joint], word, unit, value, time, np.copysign(limit, value).item(), abs(value) / limit
+            self.names[joint], quantity_name, unit, value, time, np.copysign(limit, value).item(), abs(value) / limit
         )
 
     def torque_laws(self, *, friction: bool = True) -> dict[str, AbstractMotion]:
@@ -245,20 +245,20 @@ class Feedforward(MotorMotion, Displayed):
         variables: dict[str, Any] = {}
         for k, name in enumerate(self.names):
             length_unit, force = (("m", "N"), ("rad", "N*m"))[self._arrays.turning[k]]
-            own, effort = (("m", "N"), ("rad", "N*m"))[self._arrays.motor_turning[k]]
+            motor_unit, effort = (("m", "N"), ("rad", "N*m"))[self._arrays.motor_turning[k]]
             table = {
-                "motor": (self.motor_position, own),
-                "motor_velocity": (self.motor_position[:, 1:], f"{own}/s"),
-                "motor_acceleration": (self.motor_position[:, 2:], f"{own}/s**2"),
+                "motor": (self.motor_position, motor_unit),
+                "motor_velocity": (self.motor_position[:, 1:], f"{motor_unit}/s"),
+                "motor_acceleration": (self.motor_position[:, 2:], f"{motor_unit}/s**2"),
                 "motor_torque": (self.motor_torque, effort),
                 "theta": (self.position, length_unit),
                 "torque": (self.torque, force),
                 "deflection": (self.deflection, length_unit),
                 "spring_torque": (self.spring_torque, force),
             }
-            for word, (values, unit) in table.items():
-                attributes = {"units": unit, "long_name": derivatives_of(f"{name}_{word}")}
-                variables[f"{name}_{word}"] = (("time", "derivative"), values[:, :count, k], attributes)
+            for suffix, (values, unit) in table.items():
+                attributes = {"units": unit, "long_name": derivatives_of(f"{name}_{suffix}")}
+                variables[f"{name}_{suffix}"] = (("time", "derivative"), values[:, :count, k], attributes)
         return xarray.Dataset(variables, coords=axes, attrs={"title": self.title, "source": "jounce"})
 
 
@@ -273,6 +273,6 @@ class _Bounds:
         del times
         return np.ones_like(values)
 
-    def measure(self, values: np.ndarray, at: Any = ...) -> np.ndarray:
+    def measure(self, values: np.ndarray, index: Any = ...) -> np.ndarray:
         """Return the magnitudes over their limits."""
-        return np.abs(values) / self.limits[at]
+        return np.abs(values) / self.limits[index]

@@ -31,9 +31,9 @@ def torques_of(
     if not isinstance(torque, Mapping):
         raise RobotError("must be a mapping of names to laws of time, or a function", name="torque", value=torque)
     laws = []
-    for name, given in torque.items():
+    for name, value in torque.items():
         check_name("drive", str(name), arrays.names, RobotError, name="torque")
-        index, law = arrays.names.index(name), law_or_number("torque", name, given, RobotError)
+        index, law = arrays.names.index(name), law_or_number("torque", name, value, RobotError)
         if isinstance(law, float):
             constant[index] = law
         else:

@@ -94,25 +94,25 @@ def resolved(
         If the function needs more than 100,000 pieces.
     """
     start, stop = nodes[:-1], nodes[1:]
-    duration, accepted, total = nodes[-1] - nodes[0], [], 0
-    largest, before = np.zeros(1), np.full(len(start), np.inf)
+    duration, finished, piece_count = nodes[-1] - nodes[0], [], 0
+    peaks, previous = np.zeros(1), np.full(len(start), np.inf)
     while len(start):
-        total += len(start)
-        if total > MOST:
+        piece_count += len(start)
+        if piece_count > MOST:
             message = (
                 f"changes too quickly near t = {time_text(start[0])} s to be followed; smooth the trajectory there"
             )
             raise TrajectoryError(message)
         values = function(points_of(start, stop).reshape(-1)).reshape(len(start), POINTS, -1)
-        largest = np.maximum(largest, np.abs(values).max(axis=(0, 1)))
-        last = np.abs(np.einsum("kg,pgc->pkc", ANALYSIS[-2:], values)).max(axis=1)
-        share = (np.maximum(last - floor, 0.0) / np.where(largest > 0, largest, 1.0)).max(axis=1)
-        noise = (share < NOISE) & (share > 0.25 * before)
-        good = (share <= RESOLVED) | noise | (stop - start <= SHORTEST * duration)
-        accepted.append((start[good], stop[good], values[good]))
-        middle = 0.5 * (start + stop)[~good]
-        start, stop = (np.stack(pair, axis=1).reshape(-1) for pair in ((start[~good], middle), (middle, stop[~good])))
-        before = np.repeat(share[~good], 2)
-    begins, ends, coefficients = (np.concatenate(parts) for parts in zip(*accepted, strict=True))
+        peaks = np.maximum(peaks, np.abs(values).max(axis=(0, 1)))
+        tails = np.abs(np.einsum("kg,pgc->pkc", ANALYSIS[-2:], values)).max(axis=1)
+        ratios = (np.maximum(tails - floor, 0.0) / np.where(peaks > 0, peaks, 1.0)).max(axis=1)
+        noise = (ratios < NOISE) & (ratios > 0.25 * previous)
+        keep = (ratios <= RESOLVED) | noise | (stop - start <= SHORTEST * duration)
+        finished.append((start[keep], stop[keep], values[keep]))
+        middle = 0.5 * (start + stop)[~keep]
+        start, stop = (np.stack(pair, axis=1).reshape(-1) for pair in ((start[~keep], middle), (middle, stop[~keep])))
+        previous = np.repeat(ratios[~keep], 2)
+    begins, ends, coefficients = (np.concatenate(arrays) for arrays in zip(*finished, strict=True))
     order = np.argsort(begins)
     return Pieces(np.append(begins[order], ends[order][-1]), coefficients[order])

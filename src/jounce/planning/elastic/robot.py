@@ -109,17 +109,17 @@ class _ElasticForces(AbstractJointLaws):
 
     def __call__(self, time: Any, q: Any, rate: Any) -> Any:
         links, motors = np.array(self.links), np.array(self.motors)
-        own = jnp.broadcast_to(jnp.asarray(self.torque)[:, None], (len(links), q.shape[-1]))
+        motor_torques = jnp.broadcast_to(jnp.asarray(self.torque)[:, None], (len(links), q.shape[-1]))
         if self.laws:
             zero = jnp.zeros_like(time[0])
             values = {k: law(Jet([time[0]])).coefficients[0] for k, law in zip(self.indices, self.laws, strict=True)}
-            own = own + jnp.stack([values.get(k, zero) for k in range(len(links))])
+            motor_torques = motor_torques + jnp.stack([values.get(k, zero) for k in range(len(links))])
         if self.feedback is not None:
-            own = own + self.feedback(time[0], q[links], rate[links], q[motors], rate[motors])
+            motor_torques = motor_torques + self.feedback(time[0], q[links], rate[links], q[motors], rate[motors])
         spring = jnp.asarray(self.stiffness)[:, None] * (q[motors] - q[links])
         spring = spring + jnp.asarray(self.damping)[:, None] * (rate[motors] - rate[links])
         forces = jnp.zeros(q.shape)
-        return forces.at[links].add(spring).at[motors].add(own - spring)
+        return forces.at[links].add(spring).at[motors].add(motor_torques - spring)
 
 
 def simulate_elastic_robot(
@@ -136,8 +136,8 @@ def simulate_elastic_robot(
 ) -> RobotSimulation:
     """Return the motion of a robot with elastic joints under torques of its motors; see `simulate_elastic`."""
     arrays = robot_drives(robot, drives, losses)
-    whole = elastic_robot(robot, drives, losses=losses, friction=friction)
-    names = whole.joint_names
+    robot_with_motors = elastic_robot(robot, drives, losses=losses, friction=friction)
+    names = robot_with_motors.joint_names
     links = tuple(names.index(name) for name in arrays.names)
     motors = tuple(
         names.index(name + MOTOR) if elastic else names.index(name)
@@ -152,8 +152,8 @@ def simulate_elastic_robot(
     indices, functions = tuple(k for k, _ in laws), tuple(law for _, law in laws)
     damping = stiffness * arrays.time_constant
     forces = _ElasticForces(constant, functions, stiffness, damping, indices, links, motors, feedback)
-    started = _start(arrays, state, len(names), links, motors)
-    return simulate(whole, time, order, state=started, torque=forces, drives=True, **options)
+    start_state = _start(arrays, state, len(names), links, motors)
+    return simulate(robot_with_motors, time, order, state=start_state, torque=forces, drives=True, **options)
 
 
 def _start(
@@ -162,12 +162,12 @@ def _start(
     """Return q and q' of links and rotors; by default springs are relaxed, and rotors move with the links."""
     n = len(arrays.names)
     levels = np.zeros((2, n)) if state is None else in_order("state", state, arrays.names, RobotError)
-    given = real_numbers("state", levels, RobotError)
-    if given.shape not in ((2, n), (2, 2, n)) or not np.isfinite(given).all():
+    values = real_numbers("state", levels, RobotError)
+    if values.shape not in ((2, n), (2, 2, n)) or not np.isfinite(values).all():
         message = f"must hold finite q and q' of the links, the shape (2, {n}), or of links and motors, (2, 2, {n})"
-        raise RobotError(message, name="state", value=given.tolist())
-    both = given if given.ndim == 3 else np.stack([given, given])
+        raise RobotError(message, name="state", value=values.tolist())
+    link_and_motor = values if values.ndim == 3 else np.stack([values, values])
     state_values = np.zeros((2, count))
-    state_values[:, list(motors)] = both[1]
-    state_values[:, list(links)] = both[0]
+    state_values[:, list(motors)] = link_and_motor[1]
+    state_values[:, list(links)] = link_and_motor[0]
     return state_values

@@ -104,8 +104,8 @@ def simulate_elastic(
         if name in options:
             raise JounceError("is set by this simulation itself", name=name)
     if isinstance(system, Robot):
-        given = system, drives, time, torque, state, order, options
-        return simulate_elastic_robot(*given, losses=losses, friction=friction)
+        arguments = system, drives, time, torque, state, order, options
+        return simulate_elastic_robot(*arguments, losses=losses, friction=friction)
     if isinstance(system, Mechanism):
         return simulate_elastic_mechanism(system, drives, time, torque, state, order, options)
     raise JounceError("must be a Robot or a Mechanism", name="system", value=type(system).__name__)

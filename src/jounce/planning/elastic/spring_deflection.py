@@ -60,8 +60,8 @@ class SpringDeflection:
         self.damped = np.flatnonzero(time_constant > 0)
         at_nodes = torques(nodes)
         self.levels = at_nodes.shape[1]
-        largest = np.abs(at_nodes).max(axis=0)
-        floor = np.broadcast_to(ROUNDING * largest.max(axis=1, keepdims=True), largest.shape)
+        peaks = np.abs(at_nodes).max(axis=0)
+        floor = np.broadcast_to(ROUNDING * peaks.max(axis=1, keepdims=True), peaks.shape)
 
         def flat(times: np.ndarray) -> np.ndarray:
             return torques(times).reshape(len(times), -1)
@@ -77,10 +77,10 @@ class SpringDeflection:
         integrals = self.pieces.integrals.reshape(len(changes), self.levels, -1)[:, 1:]
         size = np.abs(self.at_nodes[:, :-1]).max(axis=0)
         gap = np.abs(changes - integrals)
-        share = gap / np.maximum(size + 1e-6 * size.max(axis=1, keepdims=True), 1e-300)
-        if (share > JUMP).any():
-            piece, level, joint = np.unravel_index(np.argmax(share), share.shape)
-            time, jump = self.pieces.nodes[piece + 1], gap[piece, level, joint]
+        ratios = gap / np.maximum(size + 1e-6 * size.max(axis=1, keepdims=True), 1e-300)
+        if (ratios > JUMP).any():
+            index, level, joint = np.unravel_index(np.argmax(ratios), ratios.shape)
+            time, jump = self.pieces.nodes[index + 1], gap[index, level, joint]
             derivative = ("position", "velocity")[level] if level < 2 else f"derivative {level}"
             need = ("acceleration", "jerk", "jounce")[level] if level < 3 else f"derivative {level + 2}"
             message = (
@@ -104,11 +104,11 @@ class SpringDeflection:
         values = self.pieces.values.reshape(count, POINTS, self.levels, -1)[..., self.damped]
         gained = np.einsum("pjg,pglj->jpl", mean_weights(steps), values) / stiffness[:, None, None]
         right = np.concatenate([self._first()[:, None], gained], axis=1).reshape(-1, self.levels)
-        below = np.zeros((joints, count + 1))
-        below[:, :-1] = -np.exp(-steps).T
-        bands = np.stack([np.ones(joints * (count + 1)), below.reshape(-1)])
-        solved = solve_banded((1, 0), bands, right).reshape(joints, count + 1, self.levels)
-        deflection[..., self.damped] = np.moveaxis(solved, 0, -1)
+        subdiagonal = np.zeros((joints, count + 1))
+        subdiagonal[:, :-1] = -np.exp(-steps).T
+        bands = np.stack([np.ones(joints * (count + 1)), subdiagonal.reshape(-1)])
+        solution = solve_banded((1, 0), bands, right).reshape(joints, count + 1, self.levels)
+        deflection[..., self.damped] = np.moveaxis(solution, 0, -1)
         return deflection
 
     def _first(self) -> Float[np.ndarray, "joint level"]:
@@ -117,14 +117,14 @@ class SpringDeflection:
         torque = self.at_nodes[0][:, self.damped]
         sizes = np.abs(self.at_nodes[..., self.damped]).max(axis=0) * constant ** np.arange(self.levels)[:, None]
         rising = np.concatenate([sizes[1:] >= sizes[:-1], np.ones((1, len(constant)), bool)])
-        last = np.argmax(rising, axis=0)  # the last term before the first that is larger
+        last_order = np.argmax(rising, axis=0)  # the last term before the first that is larger
         deflection = np.zeros_like(torque)
         for level in range(self.levels):  # each follows from lower levels
             terms = np.arange(self.levels - level)[:, None]
-            within = terms <= last - level
-            expanded = np.sum(np.where(within, (-constant) ** terms * torque[level:], 0.0), axis=0) / stiffness
-            beyond = 0.0 if level == 0 else (torque[level - 1] / stiffness - deflection[level - 1]) / constant
-            deflection[level] = np.where(level <= last, expanded, beyond)
+            is_included = terms <= last_order - level
+            expanded = np.sum(np.where(is_included, (-constant) ** terms * torque[level:], 0.0), axis=0) / stiffness
+            continued = 0.0 if level == 0 else (torque[level - 1] / stiffness - deflection[level - 1]) / constant
+            deflection[level] = np.where(level <= last_order, expanded, continued)
         return deflection.T
 
     def at(self, times: Array[np.ndarray, " time"]) -> Array[np.ndarray, "time level joint"]:
@@ -134,19 +134,19 @@ class SpringDeflection:
             return self.torques(times) / self.stiffness
         cell = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, len(nodes) - 1)
         deflection = self.solution[cell]
-        between = np.flatnonzero(times > nodes[cell])
-        if not len(between):
+        inner = np.flatnonzero(times > nodes[cell])
+        if not len(inner):
             return deflection
-        start, stop = nodes[cell[between]], times[between]
+        start, stop = nodes[cell[inner]], times[inner]
         constant, stiffness = self.time_constant[self.damped], self.stiffness[self.damped]
         instants = np.concatenate([points_of(start, stop).reshape(-1), stop])
         torques = self.torques(instants)
         values, stop_torques = torques[: -len(stop)].reshape(len(start), POINTS, self.levels, -1), torques[-len(stop) :]
         steps = (stop - start)[:, None] / constant
         gained = np.einsum("pjg,pglj->plj", mean_weights(steps), values[..., self.damped]) / stiffness
-        moved = stop_torques / self.stiffness
-        moved[..., self.damped] = np.exp(-steps)[:, None] * deflection[between][..., self.damped] + gained
-        deflection[between] = moved
+        stop_deflection = stop_torques / self.stiffness
+        stop_deflection[..., self.damped] = np.exp(-steps)[:, None] * deflection[inner][..., self.damped] + gained
+        deflection[inner] = stop_deflection
         return deflection
 
     def expansion_errors(self) -> Array[np.ndarray, "order joint"]:
@@ -171,12 +171,12 @@ def mean_weights(steps: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shap
 
     a = 0.5 * steps[..., None]
     degrees = np.arange(POINTS)
-    near = np.minimum(a, LARGE)
-    small = 2.0 * near * np.sqrt(np.pi / (2.0 * near)) * ive(degrees + 0.5, near)
+    bounded = np.minimum(a, LARGE)
+    exact = 2.0 * bounded * np.sqrt(np.pi / (2.0 * bounded)) * ive(degrees + 0.5, bounded)
     j = np.arange(POINTS)
     with np.errstate(over="ignore"):
-        share = 1.0 / (2.0 * np.maximum(a, LARGE))
+        inverse = 1.0 / (2.0 * np.maximum(a, LARGE))
     factors = np.where(j <= degrees[:, None], factorial(degrees[:, None] + j) / factorial(j), 0.0)
     factors = factors / factorial(np.maximum(degrees[:, None] - j, 0))
-    large = np.sum(factors * (-share[..., None]) ** j, axis=-1)
-    return np.where(a < LARGE, small, large) @ ANALYSIS
+    asymptotic = np.sum(factors * (-inverse[..., None]) ** j, axis=-1)
+    return np.where(a < LARGE, exact, asymptotic) @ ANALYSIS

@@ -74,9 +74,9 @@ def rates_along(path: Path, state: State) -> tuple[float, ...] | None:
         return None
     rates: list[float] = []
     for level in range(1, len(state)):
-        rest = state[level] - _following(p, rates, level)
-        rate = float(rest @ p[1] / (p[1] @ p[1]))
-        if np.abs(rest - rate * p[1]).max() > ALONG * max(float(np.abs(state[level]).max()), np.abs(rest).max()):
+        excess = state[level] - _following(p, rates, level)
+        rate = float(excess @ p[1] / (p[1] @ p[1]))
+        if np.abs(excess - rate * p[1]).max() > ALONG * max(float(np.abs(state[level]).max()), np.abs(excess).max()):
             return None
         rates.append(rate)
     return tuple(rates) if rates[0] > 0 else None
@@ -91,7 +91,7 @@ def _following(p: np.ndarray, rates: Sequence[float], level: int) -> Float[np.nd
     return 0 * p[1]
 
 
-def joined_from_rest(path: Path, start: Float[np.ndarray, " joint"], at: float) -> Path:
+def joined_from_rest(path: Path, start: Float[np.ndarray, " joint"], parameter: float) -> Path:
     """Return a path that starts straight toward a place on another path, and continues along that path.
 
     Parameters
@@ -100,70 +100,70 @@ def joined_from_rest(path: Path, start: Float[np.ndarray, " joint"], at: float) 
         The path to join.
     start : array of shape (joint,)
         Start positions.
-    at : float
+    parameter : float
         Parameter of the path at the junction.
     """
-    p = path.derivatives(np.array([at]), MET - 1)[0]
-    way = p[0] - start
-    length = max(float(np.linalg.norm(way)), np.finfo(float).tiny)
+    p = path.derivatives(np.array([parameter]), MET - 1)[0]
+    direction = p[0] - start
+    length = max(float(np.linalg.norm(direction)), np.finfo(float).tiny)
     rate = length / float(np.linalg.norm(p[1]))
-    powers = _between(np.stack([start, way]), p * rate ** np.arange(MET)[:, None])
-    return extended_path(path, at, rate, [JoinedPieces(np.zeros(1), x[:, None], 1.0) for x in powers.T], 1.0)
+    powers = _between(np.stack([start, direction]), p * rate ** np.arange(MET)[:, None])
+    return extended_path(path, parameter, rate, [JoinedPieces(np.zeros(1), x[:, None], 1.0) for x in powers.T], 1.0)
 
 
-def extended_path(path: Path, at: float, rate: float, laws: Sequence[SplineMotion], until: float) -> Path:
+def extended_path(path: Path, s0: float, rate: float, laws: Sequence[SplineMotion], until: float) -> Path:
     """Return a path that follows laws over s from 0 up to a junction, and then another path at a steady rate.
 
     Parameters
     ----------
     path : Path
         The path to join.
-    at, rate : float
+    s0, rate : float
         Parameter of the path at the junction, and its derivative by s.
     laws : sequence of SplineMotion
         Laws of the joints before the junction.
     until : float
         Value of s at the junction.
     """
-    stop = until + (path.stop - at) / rate
-    named = zip(laws, path.laws.items(), strict=True)
-    whole = Path({name: _joined_law(own, law, at, rate, until, stop) for own, (name, law) in named}, 0.0, stop)
-    own = whole.derivatives(np.linspace(0.0, until, LOOKS), 0)[:, 0]
+    stop = until + (path.stop - s0) / rate
+    pairs = zip(laws, path.laws.items(), strict=True)
+    longer = Path({name: _joined_law(curve, law, s0, rate, until, stop) for curve, (name, law) in pairs}, 0.0, stop)
+    curve = longer.derivatives(np.linspace(0.0, until, LOOKS), 0)[:, 0]
     path_points = path.derivatives(np.linspace(path.start, path.stop, LOOKS), 0)[:, 0]
-    away = float(np.sqrt(((own[:, None] - path_points) ** 2).sum(axis=2)).min(axis=1).max())
-    words = f"from the running state onto the path, joined at s = {at:.6g}, at most {away:.2g} rad or m away from it"
-    return dataclasses.replace(whole, deviation=path.deviation, allowed=path.allowed, words=words, joined=until)
+    gap = float(np.sqrt(((curve[:, None] - path_points) ** 2).sum(axis=2)).min(axis=1).max())
+    words = f"from the running state onto the path, joined at s = {s0:.6g}, at most {gap:.2g} rad or m away from it"
+    return dataclasses.replace(longer, deviation=path.deviation, allowed=path.allowed, words=words, joined=until)
 
 
 def _joined_law(
-    own: SplineMotion, law: AbstractMotion, at: float, rate: float, until: float, stop: float
+    curve: SplineMotion, law: AbstractMotion, s0: float, rate: float, until: float, stop: float
 ) -> AbstractMotion:
     """Return a law that equals one law up to a value of s, and then another one at a steady rate.
 
     Two splines give one spline, with all its numbers in arrays, so that its compiled programs serve the next one too.
     """
-    last = at + rate * (stop - until)
-    near = NEAR * (last - at)
-    if not isinstance(law, SplineMotion) or at < law.breakpoints[0] - near or last > law.stop + near:
-        leader = ExpressionMotion(STEADY, {"at": at, "rate": rate, "begin": until})
-        return PiecewiseMotion([own, FollowingMotion(law, leader)], [until, stop])
+    end = s0 + rate * (stop - until)
+    slack = NEAR * (end - s0)
+    if not isinstance(law, SplineMotion) or s0 < law.breakpoints[0] - slack or end > law.stop + slack:
+        leader = ExpressionMotion(STEADY, {"at": s0, "rate": rate, "begin": until})
+        return PiecewiseMotion([curve, FollowingMotion(law, leader)], [until, stop])
     begins, powers = np.asarray(law.breakpoints), np.asarray(law.coefficients)
-    remaining = np.flatnonzero((begins > at + near) & (begins < last - near))
-    first = remaining[0] - 1 if len(remaining) else int(np.clip(np.searchsorted(begins, at, side="right") - 1, 0, None))
+    remaining = np.flatnonzero((begins > s0 + slack) & (begins < end - slack))
+    first = remaining[0] - 1 if len(remaining) else int(np.clip(np.searchsorted(begins, s0, side="right") - 1, 0, None))
     first = max(first, 0)
     derived = [np.polynomial.polynomial.polyder(powers[:, first], k) for k in range(len(powers))]
-    moved = [np.polynomial.polynomial.polyval(at - begins[first], x) / factorial(k) for k, x in enumerate(derived)]
-    after = np.column_stack([moved, powers[:, remaining]]) * rate ** np.arange(len(powers))[:, None]
-    before = np.asarray(own.coefficients)
-    count = max(len(before), len(after))
-    every = [np.pad(x, ((0, count - len(x)), (0, 0))) for x in (before, after)]
-    breakpoints = np.concatenate([np.asarray(own.breakpoints), [until], until + (begins[remaining] - at) / rate])
-    return JoinedPieces(breakpoints, np.concatenate(every, axis=1), np.float64(stop))
+    shifted = [np.polynomial.polynomial.polyval(s0 - begins[first], x) / factorial(k) for k, x in enumerate(derived)]
+    later_powers = np.column_stack([shifted, powers[:, remaining]]) * rate ** np.arange(len(powers))[:, None]
+    earlier_powers = np.asarray(curve.coefficients)
+    count = max(len(earlier_powers), len(later_powers))
+    padded = [np.pad(x, ((0, count - len(x)), (0, 0))) for x in (earlier_powers, later_powers)]
+    breakpoints = np.concatenate([np.asarray(curve.breakpoints), [until], until + (begins[remaining] - s0) / rate])
+    return JoinedPieces(breakpoints, np.concatenate(padded, axis=1), np.float64(stop))
 
 
 def _between(begins: State, ends: State) -> Float[np.ndarray, "power joint"]:
     """Return the coefficients, lowest power first, of the polynomial with given derivatives at 0 and at 1."""
     count = len(begins) + len(ends)
     conditions = [(0.0, level) for level in range(len(begins))] + [(1.0, level) for level in range(len(ends))]
-    rows = [[perm(k, level) * at ** max(k - level, 0) for k in range(count)] for at, level in conditions]
+    rows = [[perm(k, level) * end ** max(k - level, 0) for k in range(count)] for end, level in conditions]
     return np.linalg.solve(np.array(rows), np.concatenate([begins, ends]))

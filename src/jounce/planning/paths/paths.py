@@ -123,9 +123,9 @@ def path_of(
         between.check_without_points()
         return checked(path_of_samples(path, order, between.deviation))
     if isinstance(path, Mapping):
-        given: dict[str, Any] = {str(name): x for name, x in path.items()}
-        if any(isinstance(x, str | AbstractMotion) for x in given.values()):
-            laws = {name: _law(name, x) for name, x in given.items()}
+        laws_or_points: dict[str, Any] = {str(name): x for name, x in path.items()}
+        if any(isinstance(x, str | AbstractMotion) for x in laws_or_points.values()):
+            laws = {name: _law(name, x) for name, x in laws_or_points.items()}
             path = Path(laws, *_domain(laws))
     if isinstance(path, Path):
         between.check_without_points()
@@ -147,8 +147,8 @@ def path_of(
 def _lengths(points: Float[np.ndarray, "point joint"], parameter: ArrayLike | None) -> Float[np.ndarray, " point"]:
     """Return the values of s at waypoints: those given, or the normalized chord length."""
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    total = float(chords.sum())
-    if not total > 0:
+    total_length = float(chords.sum())
+    if not total_length > 0:
         raise TrajectoryError("the path does not move: all its points are the same", name="path")
     if parameter is not None:
         values = finite_row("parameter", parameter)
@@ -156,30 +156,30 @@ def _lengths(points: Float[np.ndarray, "point joint"], parameter: ArrayLike | No
             message = f"must be {len(points)} numbers that increase, one for each waypoint"
             raise TrajectoryError(message, name="parameter", value=values.tolist())
         return values
-    same = np.flatnonzero(chords <= REPEATED * total)
-    if len(same):
-        message = f"waypoint {same[0] + 2} is the same as the one before; leave it out"
-        raise TrajectoryError(message, name=f"path[{same[0] + 1}]", value=points[same[0] + 1].tolist())
-    return np.append(0.0, np.cumsum(chords)) / total
+    repeats = np.flatnonzero(chords <= REPEATED * total_length)
+    if len(repeats):
+        message = f"waypoint {repeats[0] + 2} is the same as the one before; leave it out"
+        raise TrajectoryError(message, name=f"path[{repeats[0] + 1}]", value=points[repeats[0] + 1].tolist())
+    return np.append(0.0, np.cumsum(chords)) / total_length
 
 
-def _between(lines: Lines, order: int, between: Between) -> Path:
+def _between(lines: Lines, order: int, shape: Between) -> Path:
     """Return the path of splines through waypoints, or one within a deviation of the straight lines between them.
 
     Five points get a cubic spline, or a quartic if more than two derivatives must be continuous.
     """
-    if between.deviation is not None:
-        between.check_without_points()
-        return dataclasses.replace(rounded(lines, between.deviation), points=lines)
+    if shape.deviation is not None:
+        shape.check_without_points()
+        return dataclasses.replace(rounded(lines, shape.deviation), points=lines)
     smooth = 4 if order > 2 else 3
-    degrees = (DEGREE, smooth) if between.degree is None else (between.degree,)
+    degrees = (DEGREE, smooth) if shape.degree is None else (shape.degree,)
     degree = next(d for d in (*degrees, 3, 2, 1) if len(lines.at) > d and d <= degrees[0])
     laws = {name: SplineMotion(lines.at, x, degree) for name, x in zip(lines.names, lines.points.T, strict=True)}
     points = (lines.at[:-1, None] + np.diff(lines.at)[:, None] * np.arange(1, LOOKS) / LOOKS).reshape(-1)
-    away = lines.distances(points, np.stack([polynomials_at(law, points) for law in laws.values()], axis=1))
-    words = f"splines of degree {degree} through {len(lines.at)} waypoints"
+    distances = lines.distances(points, np.stack([polynomials_at(law, points) for law in laws.values()], axis=1))
+    note = f"splines of degree {degree} through {len(lines.at)} waypoints"
     start, stop = float(lines.at[0]), float(lines.at[-1])
-    return Path(dict(laws), start, stop, float(away.max()), words=words, passed=(lines.at, lines.at), points=lines)
+    return Path(dict(laws), start, stop, float(distances.max()), words=note, passed=(lines.at, lines.at), points=lines)
 
 
 def checked(path: Path, order: int = 1) -> Path:
@@ -196,10 +196,10 @@ def checked(path: Path, order: int = 1) -> Path:
                 raise _kink(path.location(instant), int(np.argmax(jumped != 0)), name)
     s = np.linspace(path.start, path.stop, KINK_CELLS + 1)
     values = path.derivatives(s, order + 1)
-    bad = np.argwhere(~np.isfinite(values))
-    if len(bad):
-        at, level, joint = bad[0]
-        message = f"derivative {level} of the path is not finite at {path.location(float(s[at]))}"
+    failures = np.argwhere(~np.isfinite(values))
+    if len(failures):
+        index, level, joint = failures[0]
+        message = f"derivative {level} of the path is not finite at {path.location(float(s[index]))}"
         raise TrajectoryError(message, name=path.names[joint])
     if not np.abs(values[:, 1]).max() > 0:
         raise TrajectoryError("the path does not move: all its points are the same", name="path")
@@ -229,21 +229,21 @@ def cells_needed(path: Path, order: int) -> int:
     s = np.linspace(path.start, path.stop, FINEST + 1)
     values = path.derivatives(s, order + 1)  # the order that `checked` uses, so that its program serves again
     length = path.stop - path.start
-    inside = slice(int(ENDS * FINEST), int((1 - ENDS) * FINEST))
+    inner = slice(int(ENDS * FINEST), int((1 - ENDS) * FINEST))
     curves, scale = values[:, order], np.abs(values[:, 1]).max() / length ** (order - 1)
-    size = np.ptp(curves[inside], axis=0).max() + SLIGHT * scale
-    at, joint, step = 0, 0, 1
-    _check_seen(path, order, s[inside], curves[inside], size)
+    size = np.ptp(curves[inner], axis=0).max() + SLIGHT * scale
+    cell, joint, step = 0, 0, 1
+    _check_seen(path, order, s[inner], curves[inner], size)
     for cells in CELLS:
         step = FINEST // (cells * POINTS_IN_CELL)
-        ends, part = curves[::step, None], np.arange(step)[:, None] / step
-        lines = ends[:-1] + (ends[1:] - ends[:-1]) * part
-        off = np.abs(curves[:-1].reshape(lines.shape) - lines).max(axis=1) / size  # bends may lie between grid points
-        off[: int(ENDS * len(off))] = off[int((1 - ENDS) * len(off)) :] = 0.0  # cells are narrow at the ends
-        at, joint = divmod(int(np.argmax(off)), off.shape[1])
-        if off[at, joint] <= RESOLVED:
+        ends, fraction = curves[::step, None], np.arange(step)[:, None] / step
+        lines = ends[:-1] + (ends[1:] - ends[:-1]) * fraction
+        gaps = np.abs(curves[:-1].reshape(lines.shape) - lines).max(axis=1) / size  # bends may lie between grid points
+        gaps[: int(ENDS * len(gaps))] = gaps[int((1 - ENDS) * len(gaps)) :] = 0.0  # cells are narrow at the ends
+        cell, joint = divmod(int(np.argmax(gaps)), gaps.shape[1])
+        if gaps[cell, joint] <= RESOLVED:
             return cells
-    raise _too_fine(path, float(s[step // 2 + at * step]), path.names[joint])
+    raise _too_fine(path, float(s[step // 2 + cell * step]), path.names[joint])
 
 
 def _check_seen(path: Path, order: int, s: np.ndarray, curves: np.ndarray, size: float) -> None:
@@ -251,15 +251,15 @@ def _check_seen(path: Path, order: int, s: np.ndarray, curves: np.ndarray, size:
     for name, law, curve in zip(path.names, path.laws.values(), curves.T, strict=True):
         if isinstance(law, SplineMotion) and len(law.coefficients) > order:
             begins = np.asarray(law.breakpoints, float)
-            own = math.factorial(order) * np.asarray(law.coefficients, float)[order]
-            off = np.where((begins > s[0]) & (begins < s[-1]), np.abs(own - np.interp(begins, s, curve)), 0.0)
-            if off.max() > RESOLVED * max(size, np.ptp(own)):
-                raise _too_fine(path, float(begins[off.argmax()]), name)
+            derivatives = math.factorial(order) * np.asarray(law.coefficients, float)[order]
+            gaps = np.where((begins > s[0]) & (begins < s[-1]), np.abs(derivatives - np.interp(begins, s, curve)), 0.0)
+            if gaps.max() > RESOLVED * max(size, np.ptp(derivatives)):
+                raise _too_fine(path, float(begins[gaps.argmax()]), name)
 
 
-def _too_fine(path: Path, at: float, name: str) -> TrajectoryError:
+def _too_fine(path: Path, s: float, name: str) -> TrajectoryError:
     message = (
-        f"the path oscillates or bends too finely at {path.location(at)} for a time law that keeps limits: "
+        f"the path oscillates or bends too finely at {path.location(s)} for a time law that keeps limits: "
         f"{CELLS[-1]} cells do not resolve it; allow a larger deviation, smooth it, or retime shorter parts of it"
     )
     return TrajectoryError(message, name=name)
@@ -276,13 +276,13 @@ def _jumps(law: AbstractMotion, order: int) -> Any:
 
 
 def _kink(location: str, order: int, name: str) -> TrajectoryError:
-    what = {
+    phrase = {
         0: "jumps",
         1: "has a kink (its direction jumps, or turns too sharply to be resolved)",
         2: "has a jump of curvature",
     }.get(order, "is not smooth")
     limits = "" if order < 2 else ", where a limited quantity would be infinite"
-    message = f"the path {what} at {location}{limits}; round it by a deviation, or stop there and retime both parts"
+    message = f"the path {phrase} at {location}{limits}; round it by a deviation, or stop there and retime both parts"
     return TrajectoryError(message, name=name)
 
 
@@ -292,8 +292,8 @@ def _domain(laws: Mapping[str, AbstractMotion]) -> tuple[float, float]:
     domains = {(float(law.breakpoints[0]), float(law.stop)) for law in laws.values() if isinstance(law, SplineMotion)}
     if not all(bounded):
         return 0.0, 1.0
-    (only,) = domains if len(domains) == 1 else (None,)
-    return only or (0.0, 1.0)
+    (domain,) = domains if len(domains) == 1 else (None,)
+    return domain or (0.0, 1.0)
 
 
 def _law(name: str, law: Any) -> AbstractMotion:

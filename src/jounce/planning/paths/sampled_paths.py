@@ -27,35 +27,35 @@ SAMPLES = 4000  # intervals of a path that does not come from samples
 def lines_of(trajectory: JointTrajectory) -> Lines | None:
     """Return the straight lines between the samples of a trajectory; None if no joint has samples."""
     samples = {name: sampled(law) for name, law in trajectory.laws.items()}
-    times = [own[0] for own in samples.values() if own is not None]
+    times = [law_samples[0] for law_samples in samples.values() if law_samples is not None]
     if not times:
         return None
-    every = [trajectory.start, trajectory.stop, *times]
-    if any(own is None for own in samples.values()):
-        every.append(np.linspace(trajectory.start, trajectory.stop, SAMPLES + 1))
-    at = np.unique(np.hstack(every))
-    at = at[(at >= trajectory.start) & (at <= trajectory.stop)]
+    instants = [trajectory.start, trajectory.stop, *times]
+    if any(law_samples is None for law_samples in samples.values()):
+        instants.append(np.linspace(trajectory.start, trajectory.stop, SAMPLES + 1))
+    times_ = np.unique(np.hstack(instants))
+    times_ = times_[(times_ >= trajectory.start) & (times_ <= trajectory.stop)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
-        exact = None if all(samples.values()) else Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
-        columns = None if exact is None else exact.derivatives(at, 0)[:, 0]
+        path = None if all(samples.values()) else Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+        columns = None if path is None else path.derivatives(times_, 0)[:, 0]
     points = [
-        np.interp(at, *own) if own is not None else columns[:, k]  # type: ignore[index]
-        for k, own in enumerate(samples.values())
+        np.interp(times_, *law_samples) if law_samples is not None else columns[:, k]  # type: ignore[index]
+        for k, law_samples in enumerate(samples.values())
     ]
-    return Lines(at, np.stack(points, axis=1), trajectory.names, "samples")
+    return Lines(times_, np.stack(points, axis=1), trajectory.names, "samples")
 
 
 def lines_along(path: Path) -> Lines:
     """Return straight lines between many points of a path that does not come from samples."""
     knots = [np.asarray(law.breakpoints) for law in path.laws.values() if isinstance(law, SplineMotion)]
-    at = np.unique(np.concatenate([np.linspace(path.start, path.stop, SAMPLES + 1), *knots]))
-    at = at[(at >= path.start) & (at <= path.stop)]
-    lines = Lines(at, path.derivatives(at, 0)[:, 0], path.names, "places")
+    parameters = np.unique(np.concatenate([np.linspace(path.start, path.stop, SAMPLES + 1), *knots]))
+    parameters = parameters[(parameters >= path.start) & (parameters <= path.stop)]
+    lines = Lines(parameters, path.derivatives(parameters, 0)[:, 0], path.names, "places")
     if not np.isfinite(lines.points).all():
         return lines
-    between = (at[:-1, None] + np.diff(at)[:, None] * np.array([0.25, 0.5, 0.75])).reshape(-1)
-    return dataclasses.replace(lines, own=float(lines.distances(between, path.derivatives(between, 0)[:, 0]).max()))
+    inner = (parameters[:-1, None] + np.diff(parameters)[:, None] * np.array([0.25, 0.5, 0.75])).reshape(-1)
+    return dataclasses.replace(lines, own=float(lines.distances(inner, path.derivatives(inner, 0)[:, 0]).max()))
 
 
 def deviation_of(lines: Lines, given: float | None) -> float:
@@ -85,26 +85,26 @@ def path_of_samples(
     TrajectoryError
         If the trajectory does not move, or the path would bend too sharply; the message names the joint and instant.
     """
-    lines, own = lines_of(trajectory), Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+    lines, exact_path = lines_of(trajectory), Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
     if lines is None:
         if deviation is not None:
-            return rounded(lines_along(own), deviation, timed=timed)
-        return own if timed else path_of_trajectory(trajectory, order)
-    allowed, few = deviation_of(lines, deviation), _are_few(trajectory)
-    away = _swing(trajectory, own, lines, order) if few or deviation is None else np.inf
-    if away <= allowed:
-        path = own if timed else path_of_trajectory(trajectory, order)
-        if path.deviation + away <= allowed:
+            return rounded(lines_along(exact_path), deviation, timed=timed)
+        return exact_path if timed else path_of_trajectory(trajectory, order)
+    allowed, has_few = deviation_of(lines, deviation), _are_few(trajectory)
+    distance = _swing(trajectory, exact_path, lines, order) if has_few or deviation is None else np.inf
+    if distance <= allowed:
+        path = exact_path if timed else path_of_trajectory(trajectory, order)
+        if path.deviation + distance <= allowed:
             splines = [law for law in trajectory.laws.values() if isinstance(law, SplineMotion | HermiteSplineMotion)]
             degrees = sorted({law.degree for law in splines})
-            words = f"splines of degree {' and '.join(map(str, degrees))} through {len(lines.at)} samples"
-            return dataclasses.replace(path, deviation=path.deviation + away, allowed=allowed, words=words)
-    return rounded(lines, allowed, timed=timed) if few else _smoothed(trajectory, order, allowed, timed=timed)
+            note = f"splines of degree {' and '.join(map(str, degrees))} through {len(lines.at)} samples"
+            return dataclasses.replace(path, deviation=path.deviation + distance, allowed=allowed, words=note)
+    return rounded(lines, allowed, timed=timed) if has_few else _smoothed(trajectory, order, allowed, timed=timed)
 
 
 def _are_few(trajectory: JointTrajectory) -> bool:
     """Return whether the samples are a few points of a path rather than a log of a motion."""
-    counts = [len(own[0]) for law in trajectory.laws.values() if (own := sampled(law)) is not None]
+    counts = [len(samples[0]) for law in trajectory.laws.values() if (samples := sampled(law)) is not None]
     return min(counts) < FEWEST
 
 
@@ -121,9 +121,9 @@ def _smoothed(trajectory: JointTrajectory, order: int, allowed: float, *, timed:
         path = rounded(lines, (1 - OF_SMOOTHING) * allowed)
     else:
         path = path_of_trajectory(motion, order)
-    away = path.deviation + max(own.away for own in motion.joints.values())
-    words = f"within {allowed:.3g} rad or m of each of {len(motion.times)} samples"
-    return dataclasses.replace(path, deviation=away, allowed=allowed, words=words)
+    distance = path.deviation + max(joint.away for joint in motion.joints.values())
+    note = f"within {allowed:.3g} rad or m of each of {len(motion.times)} samples"
+    return dataclasses.replace(path, deviation=distance, allowed=allowed, words=note)
 
 
 def _swing(trajectory: JointTrajectory, own: Path, lines: Lines, order: int) -> float:
@@ -133,17 +133,17 @@ def _swing(trajectory: JointTrajectory, own: Path, lines: Lines, order: int) -> 
         return np.inf
     if trajectory.supported_order() < order:
         return np.inf
-    same = np.diff(lines.points, axis=0) == 0
-    dwells = np.zeros_like(same)
-    dwells[1:] |= same[1:] & same[:-1]
-    dwells[:-1] |= same[1:] & same[:-1]
-    share, farthest, count = np.arange(1, LOOKS) / LOOKS, 0.0, MANY // LOOKS
-    for first in range(0, len(same), count):
-        some = slice(first, first + count)
-        at = lines.at[:-1][some, None] + np.diff(lines.at)[some, None] * share
-        positions = own.derivatives(at.reshape(-1), 0)[:, 0]
-        moved = np.abs(positions.reshape(*at.shape, -1) - lines.points[:-1][some, None]).max(axis=1)
-        if np.any(moved[dwells[some]] > REST_DISTANCE * lines.size):
+    is_repeated = np.diff(lines.points, axis=0) == 0
+    dwells = np.zeros_like(is_repeated)
+    dwells[1:] |= is_repeated[1:] & is_repeated[:-1]
+    dwells[:-1] |= is_repeated[1:] & is_repeated[:-1]
+    fractions, max_distance, count = np.arange(1, LOOKS) / LOOKS, 0.0, MANY // LOOKS
+    for first in range(0, len(is_repeated), count):
+        chunk = slice(first, first + count)
+        parameters = lines.at[:-1][chunk, None] + np.diff(lines.at)[chunk, None] * fractions
+        positions = own.derivatives(parameters.reshape(-1), 0)[:, 0]
+        displacement = np.abs(positions.reshape(*parameters.shape, -1) - lines.points[:-1][chunk, None]).max(axis=1)
+        if np.any(displacement[dwells[chunk]] > REST_DISTANCE * lines.size):
             return np.inf
-        farthest = max(farthest, float(lines.distances(at.reshape(-1), positions).max()))
-    return farthest
+        max_distance = max(max_distance, float(lines.distances(parameters.reshape(-1), positions).max()))
+    return max_distance

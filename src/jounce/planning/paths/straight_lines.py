@@ -61,37 +61,37 @@ class Lines:
 
     def distances(self, at: Float[np.ndarray, " point"], points: Float[np.ndarray, "point joint"]) -> np.ndarray:
         """Return the distances of points from the nearest lines near their parameters."""
-        own = np.clip(np.searchsorted(self.at, at, side="right") - 1, 0, len(self.at) - 2)
-        nearest = np.full(len(at), np.inf)
+        interval = np.clip(np.searchsorted(self.at, at, side="right") - 1, 0, len(self.at) - 2)
+        distances = np.full(len(at), np.inf)
         for step in range(-ADJACENT, ADJACENT + 1):
-            line = np.clip(own + step, 0, len(self.at) - 2)
-            nearest = np.minimum(nearest, _distances_from_lines(points, self.points[line], self.points[line + 1]))
-        return nearest
+            line = np.clip(interval + step, 0, len(self.at) - 2)
+            distances = np.minimum(distances, _distances_from_lines(points, self.points[line], self.points[line + 1]))
+        return distances
 
 
-def polynomials_at(law: SplineMotion, at: Float[np.ndarray, " point"]) -> Float[np.ndarray, " point"]:
+def polynomials_at(law: SplineMotion, parameters: Float[np.ndarray, " point"]) -> Float[np.ndarray, " point"]:
     """Return the values of the polynomials of a spline, without compiling a program."""
     begins, powers = np.asarray(law.breakpoints, float), np.asarray(law.coefficients, float)
-    piece = np.clip(np.searchsorted(begins, at, side="right") - 1, 0, len(begins) - 1)
-    return np.polynomial.polynomial.polyval(at - begins[piece], powers[:, piece], tensor=False)
+    index = np.clip(np.searchsorted(begins, parameters, side="right") - 1, 0, len(begins) - 1)
+    return np.polynomial.polynomial.polyval(parameters - begins[index], powers[:, index], tensor=False)
 
 
 def _distances_from_lines(points: np.ndarray, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " point"]:
     """Return the distances of points from line segments."""
-    along, since = ends - begins, points - begins
-    lengths = (along**2).sum(axis=-1)
-    share = np.clip((along * since).sum(axis=-1) / np.where(lengths > 0, lengths, 1.0), 0.0, 1.0)
-    return np.linalg.norm(since - share[..., None] * along, axis=-1)
+    directions, offsets = ends - begins, points - begins
+    lengths = (directions**2).sum(axis=-1)
+    fraction = np.clip((directions * offsets).sum(axis=-1) / np.where(lengths > 0, lengths, 1.0), 0.0, 1.0)
+    return np.linalg.norm(offsets - fraction[..., None] * directions, axis=-1)
 
 
-def simplified_polyline(points: _Points, near: float) -> tuple[Int[np.ndarray, " vertex"], float]:
+def simplified_polyline(points: _Points, limit: float) -> tuple[Int[np.ndarray, " vertex"], float]:
     """Return a subset of points such that the straight lines between them are near all points, in sequence.
 
     Parameters
     ----------
     points : array of shape (point, joint)
         Points in sequence.
-    near : float
+    limit : float
         Largest distance of points from the line that replaces them, and largest step back along it.
 
     Returns
@@ -101,33 +101,33 @@ def simplified_polyline(points: _Points, near: float) -> tuple[Int[np.ndarray, "
     off : float
         Largest distance of a point from its line.
     """
-    last, chosen, stride, off = len(points) - 1, [0], 1, 0.0
-    while chosen[-1] < last:
+    last_index, chosen, stride, max_distance = len(points) - 1, [0], 1, 0.0
+    while chosen[-1] < last_index:
         first = chosen[-1]
-        good, bad, reach = first + 1, last + 1, stride
-        while good < last and bad > last:  # double the reach until it is too far
-            beyond = min(first + 2 * reach, last)
-            good, bad = (beyond, bad) if _off(points[first : beyond + 1], near) <= near else (good, beyond)
-            reach = beyond - first
-        while bad - good > 1 and bad <= last:
-            middle = (good + bad) // 2
-            good, bad = (middle, bad) if _off(points[first : middle + 1], near) <= near else (good, middle)
-        off, stride = max(off, _off(points[first : good + 1], near)), good - first
-        if np.any(points[good] != points[first]):
-            chosen.append(good)
-        elif good == last:
+        near, far, reach = first + 1, last_index + 1, stride
+        while near < last_index and far > last_index:  # double the reach until it is too far
+            trial = min(first + 2 * reach, last_index)
+            near, far = (trial, far) if _off(points[first : trial + 1], limit) <= limit else (near, trial)
+            reach = trial - first
+        while far - near > 1 and far <= last_index:
+            middle = (near + far) // 2
+            near, far = (middle, far) if _off(points[first : middle + 1], limit) <= limit else (near, middle)
+        max_distance, stride = max(max_distance, _off(points[first : near + 1], limit)), near - first
+        if np.any(points[near] != points[first]):
+            chosen.append(near)
+        elif near == last_index:
             break
         else:  # the points return to the same position: the next line starts from it
-            chosen[-1] = good
-    return np.array(chosen), off
+            chosen[-1] = near
+    return np.array(chosen), max_distance
 
 
-def _off(points: _Points, near: float) -> float:
+def _off(points: _Points, tolerance: float) -> float:
     """Return the distance of points from the line between the first and the last; infinite if they go back along it."""
-    along, since = points[-1] - points[0], points - points[0]
-    length = float(np.linalg.norm(along))
-    fraction = since @ (along / length) if length else np.zeros(len(points))
-    if np.max(np.maximum.accumulate(fraction) - fraction) > near:
+    direction, offsets = points[-1] - points[0], points - points[0]
+    length = float(np.linalg.norm(direction))
+    fraction = offsets @ (direction / length) if length else np.zeros(len(points))
+    if np.max(np.maximum.accumulate(fraction) - fraction) > tolerance:
         return np.inf
     return float(_distances_from_lines(points, points[:1], points[-1:]).max())
 
@@ -151,9 +151,9 @@ def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
         If the lines do not move, or the path would need more than 8192 pieces; the message gives the place.
     """
     if timed:
-        knots, points, off, chosen = lines.at, lines.points, 0.0, np.arange(len(lines.at))
+        knots, points, line_distance, chosen = lines.at, lines.points, 0.0, np.arange(len(lines.at))
     else:
-        chosen, off = simplified_polyline(lines.points, TOGETHER * (deviation - lines.own))
+        chosen, line_distance = simplified_polyline(lines.points, TOGETHER * (deviation - lines.own))
         points = lines.points[chosen]
         knots = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
         if not knots[-1] > 0:
@@ -166,37 +166,37 @@ def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
         curve = _schoenberg(begins, knots, points)
         looks = np.unique(np.append(begins[:-1, None] + np.diff(begins)[:, None] * np.arange(LOOKS) / LOOKS, knots))
         difference = curve(looks) - _on(looks, knots, points)
-        distances = np.linalg.norm(difference, axis=1) + off + lines.own
-        far = np.unique(np.searchsorted(begins, looks[distances > deviation], side="right") - 1)
-        far = far[far < len(begins) - 1]
-        if not len(far):
+        distances = np.linalg.norm(difference, axis=1) + line_distance + lines.own
+        pieces = np.unique(np.searchsorted(begins, looks[distances > deviation], side="right") - 1)
+        pieces = pieces[pieces < len(begins) - 1]
+        if not len(pieces):
             size = 2 ** int(np.ceil(np.log2(len(begins) - 1)))
             if len(begins) - 1 == size:
                 break
-            far = np.argsort(-np.diff(begins), kind="stable")[: size - len(begins) + 1]  # few shapes are compiled
-        if len(begins) + len(far) - 1 > MOST:
-            at = int(np.argmax(distances))
-            where = float(np.interp(looks[at], knots, instants))
-            word = "s" if lines.kind != "samples" else "t"
+            pieces = np.argsort(-np.diff(begins), kind="stable")[: size - len(begins) + 1]  # few shapes are compiled
+        if len(begins) + len(pieces) - 1 > MOST:
+            index = int(np.argmax(distances))
+            position = float(np.interp(looks[index], knots, instants))
+            symbol = "s" if lines.kind != "samples" else "t"
             message = (
                 f"a path within {deviation:.3g} rad or m of the straight lines between its {lines.kind} would turn too "
-                f"often or too sharply to be followed, as at {word} = {where:.6g}{' s' if word == 't' else ''}; "
+                f"often or too sharply to be followed, as at {symbol} = {position:.6g}{' s' if symbol == 't' else ''}; "
                 "choose a larger deviation, or smooth them"
             )
-            raise TrajectoryError(message, name=lines.names[int(np.argmax(np.abs(difference[at])))])
-        begins = np.sort(np.append(begins, (begins[far] + begins[far + 1]) / 2))
+            raise TrajectoryError(message, name=lines.names[int(np.argmax(np.abs(difference[index])))])
+        begins = np.sort(np.append(begins, (begins[pieces] + begins[pieces + 1]) / 2))
     powers = local_powers(curve, begins[:-1], DEGREE)
     laws = {name: SmoothPieces(begins[:-1], powers[:, :, k], float(begins[-1])) for k, name in enumerate(lines.names)}
     times = (knots, instants) if lines.kind == "samples" else None
-    words = f"within {deviation:.3g} rad or m of the straight lines between {len(lines.at)} {lines.kind}"
+    note = f"within {deviation:.3g} rad or m of the straight lines between {len(lines.at)} {lines.kind}"
     return Path(
-        laws, float(knots[0]), float(knots[-1]), float(distances.max()), deviation, words, times, (knots, instants)
+        laws, float(knots[0]), float(knots[-1]), float(distances.max()), deviation, note, times, (knots, instants)
     )
 
 
-def _on(at: np.ndarray, knots: np.ndarray, points: _Points) -> Float[np.ndarray, "sample joint"]:
+def _on(parameters: np.ndarray, knots: np.ndarray, points: _Points) -> Float[np.ndarray, "sample joint"]:
     """Return positions on straight lines."""
-    return np.stack([np.interp(at, knots, column) for column in points.T], axis=1)
+    return np.stack([np.interp(parameters, knots, column) for column in points.T], axis=1)
 
 
 def _graded(begins: np.ndarray) -> np.ndarray:
@@ -204,16 +204,16 @@ def _graded(begins: np.ndarray) -> np.ndarray:
     while True:
         lengths = np.diff(begins)
         adjacent = np.minimum(np.append(lengths[1:], np.inf), np.append(np.inf, lengths[:-1]))
-        long = np.flatnonzero(lengths > GRADED * adjacent)
-        if not len(long):
+        long_pieces = np.flatnonzero(lengths > GRADED * adjacent)
+        if not len(long_pieces):
             return begins
-        begins = np.sort(np.append(begins, (begins[long] + begins[long + 1]) / 2))
+        begins = np.sort(np.append(begins, (begins[long_pieces] + begins[long_pieces + 1]) / 2))
 
 
 def _schoenberg(begins: np.ndarray, knots: np.ndarray, points: _Points) -> Any:
     """Return Schoenberg's spline: its control points lie on straight lines, each at the mean of its knots."""
     from scipy.interpolate import BSpline  # importing SciPy takes half a second
 
-    whole = np.concatenate([begins[[0] * DEGREE], begins, begins[[-1] * DEGREE]])
-    means = np.lib.stride_tricks.sliding_window_view(whole[1:-1], DEGREE).mean(axis=1)
-    return BSpline(whole, _on(np.clip(means, knots[0], knots[-1]), knots, points), DEGREE)
+    padded_knots = np.concatenate([begins[[0] * DEGREE], begins, begins[[-1] * DEGREE]])
+    means = np.lib.stride_tricks.sliding_window_view(padded_knots[1:-1], DEGREE).mean(axis=1)
+    return BSpline(padded_knots, _on(np.clip(means, knots[0], knots[-1]), knots, points), DEGREE)

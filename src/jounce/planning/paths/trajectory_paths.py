@@ -80,15 +80,15 @@ class Ramps:
         shifted = lengths + self.gained[np.searchsorted(self.stops, lengths)]
         if not len(self.stops):
             return shifted
-        near = np.argmin(np.abs(lengths[:, None] - self.stops), axis=1)
-        away = lengths - self.stops[near]
-        target = np.minimum(np.abs(away), self.widths[near]) / self.reach[near]
-        share = np.minimum((self.power * target) ** (1 / self.power), 1.0)  # Newton's method descends to the root
+        k = np.argmin(np.abs(lengths[:, None] - self.stops), axis=1)
+        distance = lengths - self.stops[k]
+        target = np.minimum(np.abs(distance), self.widths[k]) / self.reach[k]
+        fraction = np.minimum((self.power * target) ** (1 / self.power), 1.0)  # Newton's method descends to the root
         slope = self.share.deriv()
         for _ in range(NEWTON):
-            share = np.maximum(share - (self.share(share) - target) / np.maximum(slope(share), 1e-300), 0.0)
-        inside = np.abs(away) < self.widths[near]
-        return np.where(inside, self.centers[near] + np.sign(away) * self.reach[near] * share, shifted)
+            fraction = np.maximum(fraction - (self.share(fraction) - target) / np.maximum(slope(fraction), 1e-300), 0.0)
+        is_in_ramp = np.abs(distance) < self.widths[k]
+        return np.where(is_in_ramp, self.centers[k] + np.sign(distance) * self.reach[k] * fraction, shifted)
 
     def motion(self, total: float) -> JoinedPieces:
         """Return the length over the parameter, up to a total length.
@@ -96,17 +96,17 @@ class Ramps:
         Next to a stop, the length changes by less than its rounding. Before the center, it is reduced by slightly more
         than that, so that a law with a corner at this length turns exactly at the center, where the motion rests.
         """
-        begins, pieces = [0.0], [np.polynomial.Polynomial([0.0, 1.0])]
+        begins, polynomials = [0.0], [np.polynomial.Polynomial([0.0, 1.0])]
         for stop, center, reach, width in zip(self.stops, self.centers, self.reach, self.widths, strict=True):
-            before, near, after = (
+            ramp_down, close, ramp_up = (
                 self.share(np.polynomial.Polynomial(x))
                 for x in ([1.0, -1.0 / reach], [CLOSE, -1.0 / reach], [0.0, 1.0 / reach])
             )
             begins += [center - reach, center - CLOSE * reach, center, center + reach]
-            pieces += [stop - reach * before, stop * (1 - ROUNDING) - reach * near, stop + reach * after]
-            pieces.append(np.polynomial.Polynomial([stop + width, 1.0]))
-        height = max(len(piece.coef) for piece in pieces)
-        powers = np.stack([np.pad(piece.coef, (0, height - len(piece.coef))) for piece in pieces], axis=1)
+            polynomials += [stop - reach * ramp_down, stop * (1 - ROUNDING) - reach * close, stop + reach * ramp_up]
+            polynomials.append(np.polynomial.Polynomial([stop + width, 1.0]))
+        height = max(len(p.coef) for p in polynomials)
+        powers = np.stack([np.pad(p.coef, (0, height - len(p.coef))) for p in polynomials], axis=1)
         return JoinedPieces(np.array(begins), powers, total + float(self.gained[-1]), "continue")
 
 
@@ -130,11 +130,11 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
         warnings.simplefilter("ignore", SampleWarning)
         times = _instants(path, trajectory.times)
         speeds = _speeds(path, times)
-        largest = float(np.nanmax(speeds))
-        if not largest > 0:
+        max_speed = float(np.nanmax(speeds))
+        if not max_speed > 0:
             raise TrajectoryError("the path does not move: all its points are the same", name="path")
-        rests = _rests(path, times, speeds, RESTING * largest)
-        if min(speeds[0], speeds[-1]) > REST_SPEED * largest and _accelerates_at_rests(path, times, rests):
+        rests = _rests(path, times, speeds, RESTING * max_speed)
+        if min(speeds[0], speeds[-1]) > REST_SPEED * max_speed and _accelerates_at_rests(path, times, rests):
             return dataclasses.replace(path, passed=(times, times))
         times = np.union1d(times, rests)
         lengths = np.append(0.0, np.cumsum(_between(path, times[:-1], times[1:])))
@@ -165,27 +165,27 @@ def stopping(
     order : int
         Order to which derivatives of the motion vanish at the stops.
     """
-    lengths, total = at - path.start, path.stop - path.start
-    edges = np.concatenate([[0.0], lengths, [total]])
-    widths = np.minimum(WIDEST * total, np.minimum(np.diff(edges)[:-1], np.diff(edges)[1:]) / 2)
+    lengths, total_length = at - path.start, path.stop - path.start
+    edges = np.concatenate([[0.0], lengths, [total_length]])
+    widths = np.minimum(WIDEST * total_length, np.minimum(np.diff(edges)[:-1], np.diff(edges)[1:]) / 2)
     ramps = Ramps(lengths, widths, order + 1)
-    motion = ramps.motion(total)
+    motion = ramps.motion(total_length)
     leader = JoinedPieces(motion.breakpoints, _raised(motion.coefficients, path.start), float(motion.stop), "continue")
     laws = {name: FollowingMotion(law, leader) for name, law in path.laws.items()}
 
     def parameter(s: _Parameters) -> _Parameters:
-        return ramps.parameter(np.clip(s - path.start, 0.0, total))
+        return ramps.parameter(np.clip(s - path.start, 0.0, total_length))
 
-    words = f"{path.words}, with {len(at)} stop{'s' * (len(at) > 1)} where the load changes" if path.words else ""
+    note = f"{path.words}, with {len(at)} stop{'s' * (len(at) > 1)} where the load changes" if path.words else ""
     instants = path.instants and (parameter(path.instants[0]), path.instants[1])
-    whole = dataclasses.replace(path, laws=laws, start=0.0, stop=float(leader.stop), instants=instants, words=words)
-    return dataclasses.replace(whole, passed=path.passed and (parameter(path.passed[0]), path.passed[1])), parameter
+    slowed = dataclasses.replace(path, laws=laws, start=0.0, stop=float(leader.stop), instants=instants, words=note)
+    return dataclasses.replace(slowed, passed=path.passed and (parameter(path.passed[0]), path.passed[1])), parameter
 
 
-def _raised(powers: np.ndarray, by: float) -> np.ndarray:
+def _raised(powers: np.ndarray, constant: float) -> np.ndarray:
     """Return polynomials plus a constant."""
     raised = np.array(powers, float)
-    raised[0] += by
+    raised[0] += constant
     return raised
 
 
@@ -203,11 +203,11 @@ def turns_back_within(trajectory: JointTrajectory, size: float) -> bool:
     return len(edges) > 2 and bool(np.diff(edges).min() < size)
 
 
-def _instants(path: Path, own: np.ndarray) -> Float[np.ndarray, " time"]:
+def _instants(path: Path, given_instants: np.ndarray) -> Float[np.ndarray, " time"]:
     """Return evenly spaced instants, with the given instants and all breakpoints of laws."""
     knots = [np.asarray(law.breakpoints) for law in path.laws.values() if isinstance(law, SplineMotion)]
-    every = np.concatenate([np.linspace(path.start, path.stop, INTERVALS + 1), own, *knots])
-    instants = np.unique(every[(every >= path.start) & (every <= path.stop)])
+    candidates = np.concatenate([np.linspace(path.start, path.stop, INTERVALS + 1), given_instants, *knots])
+    instants = np.unique(candidates[(candidates >= path.start) & (candidates <= path.stop)])
     distinct = np.diff(instants, append=np.inf) > 1e-12 * (path.stop - path.start)
     return instants[distinct]
 
@@ -219,21 +219,21 @@ def _speeds(path: Path, times: np.ndarray) -> Float[np.ndarray, " time"]:
 def _rests(path: Path, times: np.ndarray, speeds: np.ndarray, slow: float) -> Float[np.ndarray, " rest"]:
     """Return the inner instants at which a trajectory rests; a dwell gives many."""
     before, at, after = speeds[:-2], speeds[1:-1], speeds[2:]
-    resting = 1 + np.flatnonzero(at <= slow)
-    lowest = 1 + np.flatnonzero((at <= before) & (at <= after) & (at > slow) & (at < SLOW * speeds.max()))
-    if not len(lowest):
-        return times[resting]
-    low, high, best, least = times[lowest - 1], times[lowest + 1], times[lowest], speeds[lowest]
-    share, every = np.linspace(0.0, 1.0, ZOOM)[:, None], np.arange(len(lowest))
+    rest_indices = 1 + np.flatnonzero(at <= slow)
+    minima = 1 + np.flatnonzero((at <= before) & (at <= after) & (at > slow) & (at < SLOW * speeds.max()))
+    if not len(minima):
+        return times[rest_indices]
+    low, high, best, least = times[minima - 1], times[minima + 1], times[minima], speeds[minima]
+    fractions, columns = np.linspace(0.0, 1.0, ZOOM)[:, None], np.arange(len(minima))
     for _ in range(ZOOMS):
-        laid = low + share * (high - low)
-        speeds_there = _speeds(path, laid.reshape(-1)).reshape(laid.shape)
-        top = np.argmin(speeds_there, axis=0)
-        better = speeds_there[top, every] < least
-        best, least = np.where(better, laid[top, every], best), np.where(better, speeds_there[top, every], least)
+        trials = low + fractions * (high - low)
+        trial_speeds = _speeds(path, trials.reshape(-1)).reshape(trials.shape)
+        top = np.argmin(trial_speeds, axis=0)
+        better = trial_speeds[top, columns] < least
+        best, least = np.where(better, trials[top, columns], best), np.where(better, trial_speeds[top, columns], least)
         reach = (high - low) / (ZOOM - 1)
         low, high = np.maximum(best - reach, low), np.minimum(best + reach, high)
-    return np.union1d(times[resting], best[least <= slow])
+    return np.union1d(times[rest_indices], best[least <= slow])
 
 
 def _accelerates_at_rests(path: Path, times: np.ndarray, rests: np.ndarray) -> bool:
@@ -248,78 +248,78 @@ def _accelerates_at_rests(path: Path, times: np.ndarray, rests: np.ndarray) -> b
 def _between(path: Path, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " interval"]:
     """Return the lengths of the path over intervals of time, by Gauss quadrature."""
     half = (ends - begins) / 2
-    laid = begins[:, None] + half[:, None] * (1 + GAUSS_NODES)
-    return half * (_speeds(path, laid.reshape(-1)).reshape(laid.shape) @ WEIGHTS)
+    instants = begins[:, None] + half[:, None] * (1 + GAUSS_NODES)
+    return half * (_speeds(path, instants.reshape(-1)).reshape(instants.shape) @ WEIGHTS)
 
 
 def _stops(path: Path, times: np.ndarray, lengths: np.ndarray, rests: np.ndarray) -> Stops:
     """Return the rests at which the direction changes, each once, however long the trajectory rests."""
-    away = AWAY * lengths[-1]
-    at = lengths[np.searchsorted(times, rests)]
-    within = (at > 8 * away) & (at < lengths[-1] - 8 * away)
-    rests, at = rests[within], at[within]
+    radius = AWAY * lengths[-1]
+    positions = lengths[np.searchsorted(times, rests)]
+    is_inner = (positions > 8 * radius) & (positions < lengths[-1] - 8 * radius)
+    rests, positions = rests[is_inner], positions[is_inner]
     if not len(rests):
-        return Stops(at, at)
-    group = np.cumsum(np.diff(at, prepend=-np.inf) > away)
+        return Stops(positions, positions)
+    group = np.cumsum(np.diff(positions, prepend=-np.inf) > radius)
     slowest = np.lexsort((_speeds(path, rests), group))
-    once = slowest[np.flatnonzero(np.diff(group[slowest], prepend=0))]
-    rests, at = rests[once], at[once]
+    representatives = slowest[np.flatnonzero(np.diff(group[slowest], prepend=0))]
+    rests, positions = rests[representatives], positions[representatives]
     middle = path.derivatives(rests, 0)[:, 0]
-    beyond = np.searchsorted(lengths, at - 4 * away) - 1, np.searchsorted(lengths, at + 4 * away)
+    bounds = np.searchsorted(lengths, positions - 4 * radius) - 1, np.searchsorted(lengths, positions + 4 * radius)
     directions = []
-    for side, index in zip((-1.0, 1.0), beyond, strict=True):
+    for side, index in zip((-1.0, 1.0), bounds, strict=True):
         inner, outer = rests, times[index]
         for _ in range(HALVINGS):
-            laid = (inner + outer) / 2
-            gone = np.linalg.norm(path.derivatives(laid, 0)[:, 0] - middle, axis=1) >= away
-            inner, outer = np.where(gone, inner, laid), np.where(gone, laid, outer)
-        moved = side * (path.derivatives(outer, 0)[:, 0] - middle)
-        directions.append(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+            trials = (inner + outer) / 2
+            is_outside = np.linalg.norm(path.derivatives(trials, 0)[:, 0] - middle, axis=1) >= radius
+            inner, outer = np.where(is_outside, inner, trials), np.where(is_outside, trials, outer)
+        displacement = side * (path.derivatives(outer, 0)[:, 0] - middle)
+        directions.append(displacement / np.linalg.norm(displacement, axis=1, keepdims=True))
     turns = 2 * np.arcsin(np.clip(np.linalg.norm(directions[1] - directions[0], axis=1) / 2, 0.0, 1.0))
-    return Stops(at[turns > BEND], turns[turns > BEND])
+    return Stops(positions[turns > BEND], turns[turns > BEND])
 
 
 def _splined(path: Path, times: np.ndarray, lengths: np.ndarray, stops: Stops, order: int, count: int) -> Path:
     """Return a path of splines with about the given number of nodes, and exactly through all stops."""
-    total = float(lengths[-1])
-    edges = np.concatenate([[0.0], stops.lengths, [total]])
-    widths = np.minimum(WIDEST * total, np.minimum(np.diff(edges)[:-1], np.diff(edges)[1:]) / 2)
-    back = stops.turns > np.pi - BACK
-    ramps = Ramps(stops.lengths[back], widths[back], 2)
-    own = ramps.parameter(lengths)
+    total_length = float(lengths[-1])
+    edges = np.concatenate([[0.0], stops.lengths, [total_length]])
+    widths = np.minimum(WIDEST * total_length, np.minimum(np.diff(edges)[:-1], np.diff(edges)[1:]) / 2)
+    is_reversal = stops.turns > np.pi - BACK
+    ramps = Ramps(stops.lengths[is_reversal], widths[is_reversal], 2)
+    parameters_ = ramps.parameter(lengths)
     edges = ramps.parameter(edges)
     counts = np.maximum(PART, np.ceil(count * np.diff(edges) / edges[-1]).astype(int))
-    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True)]
-    parameters = np.append(np.concatenate(parts), edges[-1])
+    nodes = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True)]
+    parameters = np.append(np.concatenate(nodes), edges[-1])
     breaks = np.append(0, np.cumsum(counts))
-    instants = np.interp(parameters, own, times)
-    instants[breaks] = times[np.searchsorted(own, edges)]
-    before = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(times) - 1)
-    knots = ramps.parameter(lengths[before] + _between(path, times[before], instants))
+    instants = np.interp(parameters, parameters_, times)
+    instants[breaks] = times[np.searchsorted(parameters_, edges)]
+    indices = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(times) - 1)
+    knots = ramps.parameter(lengths[indices] + _between(path, times[indices], instants))
     knots[breaks] = edges
     points = path.derivatives(instants, 0)[:, 0]
     laws: dict[str, AbstractMotion]
-    if back.all():
+    if is_reversal.all():
         scale = edges[-1]
         laws = {name: SplineMotion(knots / scale, x, DEGREE) for name, x in zip(path.names, points.T, strict=True)}
-        result, at = Path(laws, 0.0, 1.0), own / scale
+        result, positions = Path(laws, 0.0, 1.0), parameters_ / scale
     else:
-        joined = breaks[np.concatenate([[True], ~back, [True]])]
-        corners = Ramps(edges[1:-1][~back], widths[~back], order + 1)
+        joints = breaks[np.concatenate([[True], ~is_reversal, [True]])]
+        corners = Ramps(edges[1:-1][~is_reversal], widths[~is_reversal], order + 1)
         leader = corners.motion(float(edges[-1]))
         columns = zip(path.names, points.T, strict=True)
-        laws = {name: FollowingMotion(_joined(knots, column, joined), leader) for name, column in columns}
-        result, at = Path(laws, 0.0, float(leader.stop)), corners.parameter(own)
-    at = np.clip(at, result.start, result.stop)
-    off = np.linalg.norm(result.derivatives(at, 0)[:, 0] - path.derivatives(times, 0)[:, 0], axis=1)
-    return dataclasses.replace(result, deviation=float(off.max()), passed=(at, times))
+        laws = {name: FollowingMotion(_joined(knots, column, joints), leader) for name, column in columns}
+        result, positions = Path(laws, 0.0, float(leader.stop)), corners.parameter(parameters_)
+    positions = np.clip(positions, result.start, result.stop)
+    deviations = np.linalg.norm(result.derivatives(positions, 0)[:, 0] - path.derivatives(times, 0)[:, 0], axis=1)
+    return dataclasses.replace(result, deviation=float(deviations.max()), passed=(positions, times))
 
 
 def _joined(knots: np.ndarray, values: np.ndarray, breaks: Int[np.ndarray, " break"]) -> JoinedPieces:
     """Return splines joined at breaks."""
     begins, powers = [], []
-    for first, last in itertools.pairwise(breaks.tolist()):
-        spline = SplineMotion(knots[first : last + 1], values[first : last + 1], DEGREE)
+    for start, stop in itertools.pairwise(breaks.tolist()):
+        spline = SplineMotion(knots[start : stop + 1], values[start : stop + 1], DEGREE)
         begins.append(np.asarray(spline.breakpoints))
         powers.append(np.asarray(spline.coefficients))
     return JoinedPieces(np.concatenate(begins), np.concatenate(powers, axis=1), float(knots[-1]))

@@ -18,11 +18,11 @@ def fastest(
     stop: float,
     conditions: Conditions,
     cells: int,
-    until: float | None = None,
+    handed_over: float | None = None,
 ) -> tuple[RateLaw, Search]:
     """Return the fastest law from a start to a stop of s, and the search that found it.
 
-    With `until`, the search starts from a law with rate 1 up to that value of s, which keeps the limits.
+    With `handed_over`, the search starts from a law with rate 1 up to that value of s, which keeps the limits.
 
     Raises
     ------
@@ -32,48 +32,48 @@ def fastest(
         If no law keeps the limits.
     """
     check_possible(source, labels, start, stop)
-    if until is not None:
-        return _faster(source, labels, (start, until, stop), conditions, cells)
-    share = np.linspace(0.0, 1.0, 201)
+    if handed_over is not None:
+        return _faster(source, labels, (start, handed_over, stop), conditions, cells)
+    u = np.linspace(0.0, 1.0, 201)
     slopes = [0.0 if rate == 0 else 1.0 for rate in conditions.rates]  # of a cubic at ends without rest
-    s = share**2 * (3 - 2 * share) + slopes[0] * share * (1 - share) ** 2 - slopes[1] * share**2 * (1 - share)
+    s = u**2 * (3 - 2 * u) + slopes[0] * u * (1 - u) ** 2 - slopes[1] * u**2 * (1 - u)
     s = start + (stop - start) * s
     duration = 0.0
     coarse = 2 if bounded_everywhere(source, start, stop) else 3
     for count in (COARSE, COARSE):
-        parameter = Parametrization(share, s, conditions.rests)
+        parameter = Parametrization(u, s, conditions.rests)
         search = Search(source, labels, parameter, RateBasis(count, coarse), conditions, coarse)
         law = search.run(np.full(count + coarse, search.level()), COARSE_ROUNDS[coarse])
-        share, s = progress(law)
+        u, s = progress(law)
         duration = law.duration
     basis = RateBasis(cells, max(conditions.order + 1, 2))
     if labels.fourth:
-        search = Search(source, labels, Parametrization(share, s, conditions.rests), basis, conditions, 3)
+        search = Search(source, labels, Parametrization(u, s, conditions.rests), basis, conditions, 3)
         law = search.run(np.full(basis.count, 1 / duration**2))
-        (share, s), duration = progress(law), law.duration
-    parameter = Parametrization(share, s, conditions.rests)
+        (u, s), duration = progress(law), law.duration
+    parameter = Parametrization(u, s, conditions.rests)
     search = Search(source, labels, parameter, basis, conditions)
     return search.fastest_law(np.full(basis.count, 1 / duration**2)), search
 
 
 def _faster(
-    source: Source, labels: Labels, parts: tuple[float, float, float], conditions: Conditions, cells: int
+    source: Source, labels: Labels, marks: tuple[float, float, float], conditions: Conditions, cells: int
 ) -> tuple[RateLaw, Search]:
     """Return the fastest law, found from one with rate 1 on the first part that comes to rest on the second."""
-    start, until, stop = parts
-    times = np.linspace(0.0, until - start + 2 * (stop - until), 401)
-    slowing = np.clip(times - (until - start), 0.0, None)
-    s = start + times - slowing**2 / (4 * (stop - until))
-    share, duration = times / times[-1], float(times[-1])
+    start, s_joined, stop = marks
+    times = np.linspace(0.0, s_joined - start + 2 * (stop - s_joined), 401)
+    slowing = np.clip(times - (s_joined - start), 0.0, None)
+    s = start + times - slowing**2 / (4 * (stop - s_joined))
+    u, duration = times / times[-1], float(times[-1])
     fine = RateBasis(cells, max(conditions.order + 1, 2))
     for basis, rounds in ((RateBasis(COARSE, 3), 2), (RateBasis(COARSE, 3), 2), (fine, 0)):
-        parameter = Parametrization(share, s, conditions.rests)
+        parameter = Parametrization(u, s, conditions.rests)
         search = Search(source, labels, parameter, basis, conditions, 3 if rounds else 4)
         even = np.full(basis.count, 1 / duration**2)
         if not rounds:
             return search.fastest_law(even), search
         law = search.run(even, rounds)
-        (share, s), duration = progress(law), law.duration
+        (u, s), duration = progress(law), law.duration
     raise AssertionError
 
 
@@ -84,7 +84,7 @@ def slowed_only(
     check_possible(source, labels, start, stop, bounded=True)
     parameter = Parametrization([0.0, 1.0], [start, stop], (1, 1))
     search = Search(source, labels, parameter, RateBasis(cells, max(conditions.order + 1, 2)), conditions)
-    as_it_was = search.law_of(np.full(search.basis.count, search.largest_z))
-    if search.peaks(as_it_was)[1].max() <= 1:
-        return as_it_was, search
+    unchanged = search.law_of(np.full(search.basis.count, search.largest_z))
+    if search.peaks(unchanged)[1].max() <= 1:
+        return unchanged, search
     return search.fastest_law(np.full(search.basis.count, search.level())), search

@@ -64,8 +64,8 @@ class TimeSplines:
         """Return the values of the splines and of their derivatives at instants."""
         from scipy.interpolate import BSpline
 
-        own = BSpline(self.knots, np.eye(self.count), self.degree)
-        return np.stack([own(at, nu=k) for k in range(order + 1)])
+        splines = BSpline(self.knots, np.eye(self.count), self.degree)
+        return np.stack([splines(at, nu=k) for k in range(order + 1)])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -129,33 +129,33 @@ def joining_curve(source: RobotQuantities, begins: _Motion, ends: _Motion, durat
     """
     splines = _graded(duration, max(DEGREE, len(ends)))
     counts = np.where(np.arange(INTERVALS) < FIRST, IN_FIRST, IN_INTERVAL)
-    parts = zip(splines.ends[:-1], splines.ends[1:], counts, strict=True)
-    at = np.append(np.concatenate([np.linspace(*part, endpoint=False) for part in parts]), duration)
-    matrices = splines.matrices(at, ORDER)
-    coefficients, free = _pinned(splines, begins, ends)
-    growth, given = np.minimum(at / (SOON * duration), 1.0), len(begins)  # margins grow with the first free derivative
-    left = [1 - SPARE * growth ** max(given - level, 0) for level in range(ORDER + 1)]
-    over, slack, worst = np.inf, np.inf, source.labels.every[0]
-    named = worst
+    intervals = zip(splines.ends[:-1], splines.ends[1:], counts, strict=True)
+    t = np.append(np.concatenate([np.linspace(*interval, endpoint=False) for interval in intervals]), duration)
+    matrices = splines.matrices(t, ORDER)
+    coefficients, free_slice = _pinned(splines, begins, ends)
+    growth, count = np.minimum(t / (SOON * duration), 1.0), len(begins)  # margins grow with the first free derivative
+    margins = [1 - SPARE * growth ** max(count - level, 0) for level in range(ORDER + 1)]
+    excess, slack, limiting = np.inf, np.inf, source.labels.every[0]
+    candidate = limiting
     for program in range(PROGRAMS):
         q = source.whole(np.einsum("dps,sj->pdj", matrices, coefficients))
-        quantities = source.at(q, at)
+        quantities = source.at(q, t)
         if program:
-            last, (over, worst) = over, _exceeded(source, quantities)
-            over, worst = (slack, named) if slack > over else (over, worst)
-            if over <= HELD:
-                return JoiningCurve(splines, coefficients, 0.0, worst)
-            if program > 2 and over > SETTLED * last:
+            previous, (excess, limiting) = excess, _exceeded(source, quantities)
+            excess, limiting = (slack, candidate) if slack > excess else (excess, limiting)
+            if excess <= HELD:
+                return JoiningCurve(splines, coefficients, 0.0, limiting)
+            if program > 2 and excess > SETTLED * previous:
                 break
-        rows = [*_range_rows(source, q), *_joint_rows(source, quantities, q, left)]
-        rows += _dynamic_rows(source, quantities, q, left) if program else []
+        rows = [*_range_rows(source, q), *_joint_rows(source, quantities, q, margins)]
+        rows += _dynamic_rows(source, quantities, q, margins) if program else []
         rows = [dataclasses.replace(row, used=row.used & (row.left < NEAR)) for row in rows] if program else rows
-        change, slack, named = _least_change(rows, source.columns, matrices, free, coefficients, duration)
+        change, slack, candidate = _least_change(rows, source.columns, matrices, free_slice, coefficients, duration)
         coefficients = coefficients.copy()
-        coefficients[free] += change
+        coefficients[free_slice] += change
         if slack > HELD and not program:  # joint limits alone make it impossible
-            return JoiningCurve(splines, coefficients, slack, named)
-    return JoiningCurve(splines, coefficients, over, worst)
+            return JoiningCurve(splines, coefficients, slack, candidate)
+    return JoiningCurve(splines, coefficients, excess, limiting)
 
 
 def _graded(duration: float, degree: int) -> TimeSplines:
@@ -168,14 +168,14 @@ def _graded(duration: float, degree: int) -> TimeSplines:
 
 def _pinned(splines: TimeSplines, begins: _Motion, ends: _Motion) -> tuple[_Coefficients, slice]:
     """Return coefficients that satisfy the conditions at both ends, and the slice of the free ones."""
-    first, last = len(begins), len(ends)
-    at = splines.matrices(splines.ends[[0, -1]], max(first, last) - 1)
-    left = np.linalg.solve(at[:first, 0, :first], begins)
-    right = np.linalg.solve(at[:last, 1, splines.count - last :], ends)
-    inner = splines.count - first - last
-    share = (np.arange(1, inner + 1) / (inner + 1))[:, None]
-    between = left[-1] * (1 - share) + right[0] * share
-    return np.concatenate([left, between, right]), slice(first, splines.count - last)
+    first_count, last_count = len(begins), len(ends)
+    end_values = splines.matrices(splines.ends[[0, -1]], max(first_count, last_count) - 1)
+    left = np.linalg.solve(end_values[:first_count, 0, :first_count], begins)
+    right = np.linalg.solve(end_values[:last_count, 1, splines.count - last_count :], ends)
+    inner = splines.count - first_count - last_count
+    fractions = (np.arange(1, inner + 1) / (inner + 1))[:, None]
+    inner_values = left[-1] * (1 - fractions) + right[0] * fractions
+    return np.concatenate([left, inner_values, right]), slice(first_count, splines.count - last_count)
 
 
 def _exceeded(source: RobotQuantities, quantities: PathQuantities) -> tuple[float, Quantity]:
@@ -204,47 +204,47 @@ def _both_sides(
 
 
 def _range_rows(source: RobotQuantities, q: np.ndarray) -> list[_Rows]:
-    rows, one = [], np.eye(q.shape[2])
+    rows, identity = [], np.eye(q.shape[2])
     for name, k in zip(source.path.names, source.columns, strict=True):
         limits = source.limits.joints[name]
         size = limits.upper - limits.lower if limits.upper is not None and limits.lower is not None else 1.0
         for sign, bound in ((1.0, limits.upper), (-1.0, limits.lower)):
             if bound is not None:
-                slopes = np.broadcast_to(sign * one[k] / size, (len(q), len(one)))
+                slopes = np.broadcast_to(sign * identity[k] / size, (len(q), len(identity)))
                 label = Quantity(name, "position", "")
                 rows.append(_Rows(0, slopes, sign * (bound - q[:, 0, k]) / size, np.ones(len(q), bool), label))
     return rows
 
 
-def _joint_rows(source: RobotQuantities, quantities: PathQuantities, q: np.ndarray, left: list) -> list[_Rows]:
-    one, labels = np.broadcast_to(np.eye(q.shape[2]), (len(q), q.shape[2], q.shape[2])), source.labels
+def _joint_rows(source: RobotQuantities, quantities: PathQuantities, q: np.ndarray, margins: list) -> list[_Rows]:
+    identity, labels = np.broadcast_to(np.eye(q.shape[2]), (len(q), q.shape[2], q.shape[2])), source.labels
     chosen, count = source.with_velocity, len(source.with_velocity)
     forward, backward = source.both_ways("velocity", chosen, q)
-    rows = _both_sides(1, one[:, chosen], q[:, 1, chosen], -backward, forward, left, labels.first[:count])
+    rows = _both_sides(1, identity[:, chosen], q[:, 1, chosen], -backward, forward, margins, labels.first[:count])
     chosen, count = source.with_acceleration, len(source.with_acceleration)
     for level, low, high, names in (
         (2, quantities.lower, quantities.upper, labels.second),
         (3, quantities.rate_lower, quantities.rate_upper, labels.rates),
     ):
         rows += _both_sides(
-            level, one[:, chosen], q[:, level, chosen], low[:, :count], high[:, :count], left, names[:count]
+            level, identity[:, chosen], q[:, level, chosen], low[:, :count], high[:, :count], margins, names[:count]
         )
     chosen, bounds = source.with_jounce, quantities.fourth_bounds
-    return rows + _both_sides(4, one[:, chosen], q[:, 4, chosen], -bounds, bounds, left, labels.fourth)
+    return rows + _both_sides(4, identity[:, chosen], q[:, 4, chosen], -bounds, bounds, margins, labels.fourth)
 
 
-def _dynamic_rows(source: RobotQuantities, quantities: PathQuantities, q: np.ndarray, left: list) -> list[_Rows]:
+def _dynamic_rows(source: RobotQuantities, quantities: PathQuantities, q: np.ndarray, margins: list) -> list[_Rows]:
     """Return the rows of torques, of their rates, and of points of links."""
     rows, labels, count = [], source.labels, len(source.with_acceleration)
     if source.with_effort:
         masses = np.asarray(mass_matrix(source.robot, q[:, 0], drives=source.drives))[:, source.with_effort]
-        parts = quantities.second[:, count:]
-        values, rates = (parts[..., [C + k, D + k, G + k]].sum(axis=-1) for k in (0, 4))
-        for level, own, low, high, names in (
+        terms = quantities.second[:, count:]
+        values, rates = (terms[..., [C + k, D + k, G + k]].sum(axis=-1) for k in (0, 4))
+        for level, sizes, low, high, names in (
             (2, values, quantities.lower, quantities.upper, labels.second),
             (3, rates, quantities.rate_lower, quantities.rate_upper, labels.rates),
         ):
-            rows += _both_sides(level, masses, own, low[:, count:], high[:, count:], left, names[count:])
+            rows += _both_sides(level, masses, sizes, low[:, count:], high[:, count:], margins, names[count:])
     fast = [point for point in source.limits.points if point.speed is not None]
     forced = [point for point in source.limits.points if point.acceleration is not None]
     sets = (
@@ -255,10 +255,10 @@ def _dynamic_rows(source: RobotQuantities, quantities: PathQuantities, q: np.nda
         for point, label in zip(points, names, strict=True):
             vector = source.point(q, point)[:, level]
             size = np.linalg.norm(vector, axis=1)
-            along = vector / np.maximum(size, np.finfo(float).tiny)[:, None]
+            directions = vector / np.maximum(size, np.finfo(float).tiny)[:, None]
             slopes = point_slope(source.robot, q[:, :1], point.link, point.point)
-            slopes = np.einsum("pk,pkj->pj", along, slopes) / getattr(point, field)
-            rows.append(_Rows(level, slopes, left[level] - size / getattr(point, field), size > 0, label))
+            slopes = np.einsum("pk,pkj->pj", directions, slopes) / getattr(point, field)
+            rows.append(_Rows(level, slopes, margins[level] - size / getattr(point, field), size > 0, label))
     return rows
 
 
@@ -283,24 +283,24 @@ def _least_change(
     from scipy import sparse
 
     clarabel = cone_solver()
-    own = matrices[:, :, free]
+    free_matrices = matrices[:, :, free]
     joints = coefficients.shape[1]
-    size = own.shape[2] * joints
-    blocks, sides, which = [], [], []
+    size = free_matrices.shape[2] * joints
+    blocks, sides, row_numbers = [], [], []
     for index, row in enumerate(rows):
         slopes = row.slopes[:, columns]
-        used = row.used & (np.abs(own[row.level]).max(axis=1) > 0) & (np.abs(slopes).max(axis=1) > 0)
-        product = own[row.level][used][:, :, None] * slopes[used][:, None, :]
+        is_used = row.used & (np.abs(free_matrices[row.level]).max(axis=1) > 0) & (np.abs(slopes).max(axis=1) > 0)
+        product = free_matrices[row.level][is_used][:, :, None] * slopes[is_used][:, None, :]
         blocks.append(sparse.csr_matrix(product.reshape(len(product), size)))
-        sides.append(row.left[used])
-        which.append(np.full(len(product), index))
+        sides.append(row.left[is_used])
+        row_numbers.append(np.full(len(product), index))
     jerk = matrices[3][:, free]
     unit = duration**3 / max(float(np.ptp(coefficients, axis=0).max()), np.finfo(float).tiny)
-    before = np.einsum("ps,sj->pj", matrices[3], coefficients) * unit
-    weight = 1 / (len(jerk) + float((before**2).sum()))
+    jerks = np.einsum("ps,sj->pj", matrices[3], coefficients) * unit
+    weight = 1 / (len(jerk) + float((jerks**2).sum()))
     square = sparse.kron(sparse.csr_matrix(jerk.T @ jerk * unit**2 * weight), sparse.identity(joints))
     quadratic = sparse.triu(sparse.block_diag([square, sparse.csc_matrix((1, 1))])).tocsc()
-    linear = np.append((jerk.T @ before * unit * weight).reshape(-1), PENALTY)
+    linear = np.append((jerk.T @ jerks * unit * weight).reshape(-1), PENALTY)
     bounds: Any = sparse.vstack(blocks)
     elastic = sparse.hstack([bounds, sparse.csr_matrix(-np.ones((bounds.shape[0], 1)))])
     positive = sparse.csr_matrix(([-1.0], ([0], [size])), shape=(1, size + 1))
@@ -312,7 +312,7 @@ def _least_change(
     solution = clarabel.DefaultSolver(quadratic, linear, matrix, right, cones, settings).solve()
     x = np.array(solution.x)
     if str(solution.status) not in ("Solved", "AlmostSolved") or not np.isfinite(x).all():
-        return np.zeros((own.shape[2], joints)), np.inf, rows[0].label
+        return np.zeros((free_matrices.shape[2], joints)), np.inf, rows[0].label
     prices = np.array(solution.z)[:-1]
-    worst = rows[int(np.concatenate(which)[int(np.argmax(prices))])].label
-    return x[:-1].reshape(-1, joints), max(float(x[-1]), 0.0), worst
+    limiting = rows[int(np.concatenate(row_numbers)[int(np.argmax(prices))])].label
+    return x[:-1].reshape(-1, joints), max(float(x[-1]), 0.0), limiting

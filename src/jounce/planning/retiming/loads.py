@@ -49,23 +49,23 @@ def with_stops(path: Path, loads: Sequence[CarriedLoad], order: int) -> tuple[Pa
     order : int
         Order to which derivatives of the motion are continuous.
     """
-    near = SAME * (path.stop - path.start)
+    tolerance = SAME * (path.stop - path.start)
     edges = np.unique([x for load in loads if not load.moving for x in (load.start, load.stop) if x is not None])
-    edges = edges[(edges > path.start + near) & (edges < path.stop - near)] if len(edges) else edges
-    edges = edges[np.diff(edges, prepend=-np.inf) > near]
+    edges = edges[(edges > path.start + tolerance) & (edges < path.stop - tolerance)] if len(edges) else edges
+    edges = edges[np.diff(edges, prepend=-np.inf) > tolerance]
     if len(edges):
         speeds = np.abs(path.derivatives(np.append(edges, np.linspace(path.start, path.stop, LOOKS)), 1)[:, 1]).max(1)
         edges = edges[speeds[: len(edges)] > RESTS * speeds.max()]
     if not len(edges):
         return path, tuple(loads)
-    stopped, parameter = stopping(path, edges, order)
+    stopping_path, parameter = stopping(path, edges, order)
 
-    def placed(load: CarriedLoad) -> CarriedLoad:
+    def with_parameters(load: CarriedLoad) -> CarriedLoad:
         ends = [end for end in ("start", "stop") if getattr(load, end) is not None]
         parameters = parameter(np.array([getattr(load, end) for end in ends], float)).tolist()
         return dataclasses.replace(load, **dict(zip(ends, parameters, strict=True)))
 
-    return stopped, tuple(placed(load) for load in loads)
+    return stopping_path, tuple(with_parameters(load) for load in loads)
 
 
 def _along(load: object, path: Path, timed: bool) -> CarriedLoad:
@@ -77,26 +77,26 @@ def _along(load: object, path: Path, timed: bool) -> CarriedLoad:
 
 def _place(value: float, load: CarriedLoad, path: Path, timed: bool) -> float:
     """Return the parameter of a path at a place in the unit of a load."""
-    name, by = f"loads.{load.link}", load.by
-    passed = (np.array([path.start, path.stop]),) * 2 if timed else path.passed
-    if by == "waypoint" and path.points is None:
-        raise TrajectoryError("the path has no waypoints; give by='time', 's' or 'share'", name=name, value=by)
-    if by == "time" and (passed is None or path.points is not None):
+    name, unit = f"loads.{load.link}", load.by
+    instants = (np.array([path.start, path.stop]),) * 2 if timed else path.passed
+    if unit == "waypoint" and path.points is None:
+        raise TrajectoryError("the path has no waypoints; give by='time', 's' or 'share'", name=name, value=unit)
+    if unit == "time" and (instants is None or path.points is not None):
         message = "the path says nothing of time; give by='s', 'share' or, of waypoints, 'waypoint'"
-        raise TrajectoryError(message, name=name, value=by)
-    if by == "s":
+        raise TrajectoryError(message, name=name, value=unit)
+    if unit == "s":
         low, high, s = path.start, path.stop, value
-    elif by == "share":
+    elif unit == "share":
         low, high, s = 0.0, 1.0, path.start + value * (path.stop - path.start)
     else:
-        assert passed is not None
-        at: np.ndarray = path.points.at if by == "waypoint" else passed[1]  # type: ignore[union-attr]
-        low, high = (1, len(at)) if by == "waypoint" else (float(at[0]), float(at[-1]))
-        counted = at[int(np.clip(value, low, high)) - 1] if by == "waypoint" else value
-        s = float(np.interp(counted, passed[1], passed[0]))
+        assert instants is not None
+        table: np.ndarray = path.points.at if unit == "waypoint" else instants[1]  # type: ignore[union-attr]
+        low, high = (1, len(table)) if unit == "waypoint" else (float(table[0]), float(table[-1]))
+        instant = table[int(np.clip(value, low, high)) - 1] if unit == "waypoint" else value
+        s = float(np.interp(instant, instants[1], instants[0]))
     if not low <= value <= high:
-        what = {"waypoint": "waypoints", "time": "instants", "s": "s", "share": "shares of the path"}[by]
-        raise TrajectoryError(f"is not on the path, whose {what} go from {low:g} to {high:g}", name=name, value=value)
+        noun = {"waypoint": "waypoints", "time": "instants", "s": "s", "share": "shares of the path"}[unit]
+        raise TrajectoryError(f"is not on the path, whose {noun} go from {low:g} to {high:g}", name=name, value=value)
     return float(s)
 
 
@@ -105,11 +105,11 @@ def instant_at(progress: FollowingMotion, duration: float, s: float) -> float:
     low, high = 0.0, duration
     while True:
         looks = np.linspace(low, high, LOOKS)
-        after = int(np.searchsorted(law_derivatives([progress], looks, 0)[0, 0], s))
-        near = float(looks[max(after - 1, 0)]), float(looks[min(after, LOOKS - 1)])
-        if near == (low, high) or near[1] - near[0] <= np.spacing(duration):
-            return near[1]
-        low, high = near
+        index = int(np.searchsorted(law_derivatives([progress], looks, 0)[0, 0], s))
+        bracket = float(looks[max(index - 1, 0)]), float(looks[min(index, LOOKS - 1)])
+        if bracket == (low, high) or bracket[1] - bracket[0] <= np.spacing(duration):
+            return bracket[1]
+        low, high = bracket
 
 
 def in_time(loads: Sequence[CarriedLoad], progress: FollowingMotion, duration: float) -> tuple[CarriedLoad, ...]:

@@ -35,28 +35,28 @@ def retime_mechanism(
 ) -> RetimedTrajectory:
     """Return the fastest motion of the drivers of a mechanism along the path of their laws; see `retime`."""
     source = MechanismQuantities(mechanism, limits)
-    given = source.limits.values()
-    least = 2 if any(x.jerk is not None or x.effort_rate is not None for x in given) else 1
-    if order is not None and order < least:
-        message = f"these limits require derivatives that are continuous to order {least} or higher"
+    all_limits = source.limits.values()
+    min_order = 2 if any(x.jerk is not None or x.effort_rate is not None for x in all_limits) else 1
+    if order is not None and order < min_order:
+        message = f"these limits require derivatives that are continuous to order {min_order} or higher"
         raise MechanismError(message, name="order", value=order)
-    conditions = Conditions(order or least, rates)
+    conditions = Conditions(order or min_order, rates)
     checked(source.path, conditions.order)
     source.refer_to(None)
     law, search = fastest(source, source.labels, source.path.start, source.path.stop, conditions, cells)
     for _ in range(EXPANSIONS if source.loaded else 0):
-        before = law.duration
+        previous = law.duration
         source.refer_to(law)
         law, search = fastest(source, source.labels, source.path.start, source.path.stop, conditions, cells)
-        if abs(law.duration - before) < STEADY * before:
+        if abs(law.duration - previous) < STEADY * previous:
             break
     if duration is not None and duration >= law.duration:
         law = search.lengthened(law, duration)
     note = ""
     for _ in range(SLOWINGS):
         laws, report = _checked(source, mechanism, law)
-        over = 0.0 if report.worst is None else (report.worst.ratio or 0.0) - 1
-        if over <= 1e-9:
+        excess = 0.0 if report.worst is None else (report.worst.ratio or 0.0) - 1
+        if excess <= 1e-9:
             if duration is not None and duration < laws.stop * (1 - SHORTER):
                 message = f"the least time of this path within these limits is {laws.stop:.9g} s, which is longer"
                 raise TrajectoryError(message, name="duration", value=duration)
@@ -69,10 +69,10 @@ def retime_mechanism(
                 active_limits(search, law, rate_motion(law)),
             )
         if report.worst is not None:
-            note = f" of the {report.worst.quantity} of {report.worst.joint} by {over:.2g} of it"
+            note = f" of the {report.worst.quantity} of {report.worst.joint} by {excess:.2g} of it"
         if any(rates):
             break
-        law = law.slowed(1 + 2 * over + 1e-7)
+        law = law.slowed(1 + 2 * excess + 1e-7)
     message = f"the law found breaks the limit{note}; try more cells, or smaller rates at the ends"
     raise SolveError(message, name="cells", value=cells)
 
@@ -89,17 +89,17 @@ def _checked(source: MechanismQuantities, mechanism: Mechanism, law: RateLaw) ->
     motion = rate_motion(law)
     progress = FollowingMotion(law.parameter, motion)
     laws = _MechanismLaws(
-        {name: FollowingMotion(own, progress) for name, own in source.laws.items()}, motion.duration, progress
+        {name: FollowingMotion(law_, progress) for name, law_ in source.laws.items()}, motion.duration, progress
     )
     times = np.linspace(0.0, motion.duration, INSTANTS)
     _, _, ratios = source.ratios_of(progress, times)
     step = times[1]
-    worst = times[np.argmax(ratios, axis=0)]
-    around = (worst[:, None] + step * SPREAD * np.linspace(-1, 1, AROUND)).reshape(-1)
-    times = np.unique(np.clip(np.concatenate([times, around]), 0.0, motion.duration))
+    peak_times = times[np.argmax(ratios, axis=0)]
+    nearby = (peak_times[:, None] + step * SPREAD * np.linspace(-1, 1, AROUND)).reshape(-1)
+    times = np.unique(np.clip(np.concatenate([times, nearby]), 0.0, motion.duration))
     times = times[np.append(True, np.diff(times) > 1e-9 * motion.duration)]
     values, bounds, ratios = source.ratios_of(progress, times)
-    at = np.argmax(ratios, axis=0)
+    peaks = np.argmax(ratios, axis=0)
     rows = tuple(
         LimitRow(
             label.owner,
@@ -110,7 +110,7 @@ def _checked(source: MechanismQuantities, mechanism: Mechanism, law: RateLaw) ->
             float(np.copysign(bounds[i, k], values[i, k])),
             float(ratios[i, k]),
         )
-        for k, (label, i) in enumerate(zip(source.labels.every, at.tolist(), strict=True))
+        for k, (label, i) in enumerate(zip(source.labels.every, peaks.tolist(), strict=True))
         if np.isfinite(bounds[i, k])
     )
     names = tuple(dict.fromkeys(label.owner for label in source.labels.every))

@@ -182,15 +182,15 @@ def retime(
 
     quantities = functools.partial(_quantities, robot, limits=limits, drives=drives, loads=path_loads)
 
-    def planned(along: Path, conditions: Conditions, until: float | None) -> RetimedTrajectory:
-        source = quantities(along)
-        if until is None:  # a curve joined to a path is already smooth
-            checked(along, chosen)
+    def planned(path_: Path, conditions: Conditions, junction_s: float | None) -> RetimedTrajectory:
+        source = quantities(path_)
+        if junction_s is None:  # a curve joined to a path is already smooth
+            checked(path_, chosen)
         source.check_range()
-        own_cells = cells or cells_needed(along, chosen)
-        law, search = fastest(source, source.labels, along.start, along.stop, conditions, own_cells, until)
+        own_cells = cells or cells_needed(path_, chosen)
+        law, search = fastest(source, source.labels, path_.start, path_.stop, conditions, own_cells, junction_s)
         certified = functools.partial(
-            _certified, robot, along, search=search, source=source, drives=drives, hand_over=any(conditions.rates)
+            _certified, robot, path_, search=search, source=source, drives=drives, hand_over=any(conditions.rates)
         )
         if duration is None:
             return certified(law)
@@ -260,12 +260,12 @@ def _repaired(
     path_loads = along_path(loads, path, timed=True)
     source = RobotQuantities(robot, path, limits, drives=drives, loads=path_loads)
     source.check_range()
-    given = JointTrajectory(path.laws, path.start, path.stop, trajectory.times)
-    ends = _ends(robot, given, source, drives, hand_over)
+    timed_trajectory = JointTrajectory(path.laws, path.start, path.stop, trajectory.times)
+    ends = _ends(robot, timed_trajectory, source, drives, hand_over)
     cells = cells or cells_needed(path, chosen)
     speeds = np.abs(path.derivatives(np.linspace(path.start, path.stop, 501), 1)[:, 1]).max(axis=1)
-    within = within_limits(source, np.array([path.start, path.stop])) & (speeds[[0, -1]] > SPEEDS * speeds.max())
-    first, last = (1.0 if as_it_was else None for as_it_was in within.tolist())
+    keeps_limits = within_limits(source, np.array([path.start, path.stop])) & (speeds[[0, -1]] > SPEEDS * speeds.max())
+    first, last = (1.0 if is_kept else None for is_kept in keeps_limits.tolist())
     conditions = Conditions(chosen, (first, last), max_rate=1.0)
     law, search = slowed_only(source, source.labels, path.start, path.stop, conditions, cells)
     retimed = _certified(robot, path, law, search=search, source=source, drives=drives, hand_over=True)
@@ -275,7 +275,7 @@ def _repaired(
     return retimed
 
 
-def _ends(robot: Robot, given: JointTrajectory, source: RobotQuantities, drives: bool, hand_over: bool) -> Any:
+def _ends(robot: Robot, trajectory: JointTrajectory, source: RobotQuantities, drives: bool, hand_over: bool) -> Any:
     """Return the ends of a trajectory before its repair.
 
     Raises
@@ -283,7 +283,7 @@ def _ends(robot: Robot, given: JointTrajectory, source: RobotQuantities, drives:
     TrajectoryError
         If the motion jumps at an end, and the robot does not already move.
     """
-    ends = check_motion(robot, given, source.limits, drives=drives).ends
+    ends = check_motion(robot, trajectory, source.limits, drives=drives).ends
     for end in () if hand_over else ends:
         if end.breaks:
             owner, quantity = end.breaks[0]
@@ -319,22 +319,22 @@ def _certified(
         if search.duration is not None and not any(search.conditions.rates):
             motion = motion.slower(search.duration / motion.duration)  # exactly
         progress = FollowingMotion(law.parameter, motion)
-        laws = {name: FollowingMotion(own, progress) for name, own in path.laws.items()}
-        bare = JointTrajectory(laws, 0.0, motion.duration, np.linspace(0.0, motion.duration, law.basis.cells + 1))
+        laws = {name: FollowingMotion(law_, progress) for name, law_ in path.laws.items()}
+        trajectory = JointTrajectory(laws, 0.0, motion.duration, np.linspace(0.0, motion.duration, law.basis.cells + 1))
         loads = in_time(source.loaded.loads, progress, motion.duration)
-        report = check_motion(robot, bare, source.limits, drives=drives, hand_over=hand_over, loads=loads)
-        over = (report.worst.ratio or 0.0) - 1 if report.worst else 0.0
-        if over <= LIMIT_TOLERANCE:
+        report = check_motion(robot, trajectory, source.limits, drives=drives, hand_over=hand_over, loads=loads)
+        excess = (report.worst.ratio or 0.0) - 1 if report.worst else 0.0
+        if excess <= LIMIT_TOLERANCE:
             active = active_limits(search, law, motion)
             if path.joined is not None:
-                until = instant_at(progress, motion.duration, path.joined)
-                path = dataclasses.replace(path, words=f"{path.words} for {until:.3g} s")
-            return RetimedTrajectory(laws, bare.stop, path, progress, report, active, loads)
-        if attempt == ATTEMPTS - 1 or not np.isfinite(over):
+                duration = instant_at(progress, motion.duration, path.joined)
+                path = dataclasses.replace(path, words=f"{path.words} for {duration:.3g} s")
+            return RetimedTrajectory(laws, trajectory.stop, path, progress, report, active, loads)
+        if attempt == ATTEMPTS - 1 or not np.isfinite(excess):
             note = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"
             message = f"the time law found breaks the limit{note}; try more cells"
             raise SolveError(message, name="cells", value=law.basis.cells)
-        law = search.with_margin(law, over)
+        law = search.with_margin(law, excess)
     raise AssertionError
 
 
@@ -346,18 +346,18 @@ def _of_mechanism(limits: GivenLimits | None) -> dict[str, Limits]:
 
 def _order(order: int | None, limits: MotionLimits, robot: Robot) -> int:
     """Return the highest derivative that must be continuous."""
-    least = 1
-    given = [*(limits.joints[name] for name in robot.joint_names), *SharedFollowers.of(robot).limits.values()]
+    min_order = 1
+    all_limits = [*(limits.joints[name] for name in robot.joint_names), *SharedFollowers.of(robot).limits.values()]
     varying = {field for laws in limits.varying.values() for field in laws}
-    if any(x.jerk is not None or x.effort_rate is not None for x in given) or varying & {"jerk", "effort_rate"}:
-        least = 2
+    if any(x.jerk is not None or x.effort_rate is not None for x in all_limits) or varying & {"jerk", "effort_rate"}:
+        min_order = 2
     if limits.jounce or "jounce" in varying:
-        least = 3
+        min_order = 3
     if order is None:
-        return least
+        return min_order
     requested = whole_number("order", order, 1, MAX_ORDER, error=TrajectoryError)
-    if requested < least:
-        message = f"these limits require derivatives that are continuous to order {least} or higher"
+    if requested < min_order:
+        message = f"these limits require derivatives that are continuous to order {min_order} or higher"
         raise TrajectoryError(message, name="order", value=order)
     return requested
 

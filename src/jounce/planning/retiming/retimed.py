@@ -60,7 +60,7 @@ class RetimedTrajectory(JointTrajectory):
         assert isinstance(motion, RateMotion)
         slow = motion.slower(factor)
         progress = FollowingMotion(parameter, slow)
-        laws = {name: FollowingMotion(own, progress) for name, own in self.path.laws.items()}
+        laws = {name: FollowingMotion(law, progress) for name, law in self.path.laws.items()}
         loads = [
             dataclasses.replace(load, **{end: x * factor for end in ("start", "stop") if (x := getattr(load, end))})
             for load in self.loads

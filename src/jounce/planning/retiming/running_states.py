@@ -79,29 +79,29 @@ def retimed_from(
     if largest_ratio(source, state)[0] > 1 - SPARE:  # a limit of a point or of a torque, not of a joint
         state = within_torque_limits(source, state * (1 - 2 * ROUNDING) ** np.arange(len(state))[:, None])
         check_state(source, state, -SPARE)
-    if along := rates_along(path, state):
-        own = dataclasses.replace(conditions, rates=(along[0], conditions.rates[1]), further=along[1:])
+    if initial := rates_along(path, state):
+        adapted = dataclasses.replace(conditions, rates=(initial[0], conditions.rates[1]), further=initial[1:])
         try:
-            return planned(path, own, None)
+            return planned(path, adapted, None)
         except SolveError:
             pass  # the path bends too sharply for this state: leave it, and join it again
-    moving = bool(state[1].any())
-    own = conditions
-    if moving:
-        own = dataclasses.replace(conditions, rates=(1.0, conditions.rates[1]), further=(0.0,) * (len(state) - 2))
+    is_moving = bool(state[1].any())
+    adapted = conditions
+    if is_moving:
+        adapted = dataclasses.replace(conditions, rates=(1.0, conditions.rates[1]), further=(0.0,) * (len(state) - 2))
     reasons: list[str] = []
-    for share in SHARES:
-        at = path.start + share * (path.stop - path.start)
+    for fraction in SHARES:
+        junction = path.start + fraction * (path.stop - path.start)
         try:
-            if moving:
-                onto, until = joined(source, state, at, conditions.order)
+            if is_moving:
+                joined_path, junction_s = joined(source, state, junction, conditions.order)
             else:
-                onto, until = joined_from_rest(path, state[0], at), None
-            return planned(onto, own, until)
+                joined_path, junction_s = joined_from_rest(path, state[0], junction), None
+            return planned(joined_path, adapted, junction_s)
         except (SolveError, TrajectoryError, RobotError) as error:
             if error.name == "duration":
                 raise
-            reasons.append(f"joined at s = {at:.6g}, {error.message.removesuffix('; choose smaller rates')}")
+            reasons.append(f"joined at s = {junction:.6g}, {error.message.removesuffix('; choose smaller rates')}")
     message = (
         "no motion from this state onto the path was found that keeps the limits; choose another path, or leave more "
         f"of the limits to the motion before: {'; '.join(dict.fromkeys(reasons))}"
@@ -113,15 +113,15 @@ def check_state(source: RobotQuantities, state: Float[np.ndarray, "derivative jo
     """Raise TrajectoryError if a state exceeds a limit by more than a fraction of it."""
     for name, value in zip(source.path.names, state[0].tolist(), strict=True):
         limits = source.limits.joints[name]
-        for bound, sign, word in ((limits.upper, 1, "above"), (limits.lower, -1, "below")):
+        for bound, sign, side in ((limits.upper, 1, "above"), (limits.lower, -1, "below")):
             if bound is not None and sign * (value - bound) > ROUNDING * max(1.0, abs(bound)):
-                message = f"the position of {name} is {word} the end of its range, {bound:g}, where the motion begins"
+                message = f"the position of {name} is {side} the end of its range, {bound:g}, where the motion begins"
                 raise TrajectoryError(message, name="state", value=value)
     ratio, value, label = largest_ratio(source, state)
     if ratio > 1 + allowed:
-        where = "above" if ratio > 1 + ROUNDING else "to rounding at"
+        phrase = "above" if ratio > 1 + ROUNDING else "to rounding at"
         message = (
-            f"the {label.word} of {label.owner} is {where} its limit of {abs(value) / ratio:.6g} {label.unit} where "
+            f"the {label.word} of {label.owner} is {phrase} its limit of {abs(value) / ratio:.6g} {label.unit} where "
             "the motion is to begin"
         )
         raise TrajectoryError(message, name="state", value=value)
@@ -132,12 +132,12 @@ def largest_ratio(
 ) -> tuple[float, float, Quantity]:
     """Return the largest ratio of a quantity of a state to its limit, the value, and the quantity."""
     curves, labels = _curves(source, state)[0], source.labels
-    known = (1, 2, 3, 2, 4)  # orders of derivatives of the quantities, in the order of the labels
+    orders = (1, 2, 3, 2, 4)  # orders of derivatives of the quantities, in the order of the labels
     counts = [len(x) for x in (labels.first, labels.second, labels.rates, labels.vectors, labels.fourth)]
-    ratios = np.where(np.repeat(known, counts) < len(state), curves.ratios(EVEN)[0], 0.0)
-    worst = int(np.argmax(ratios))
+    ratios = np.where(np.repeat(orders, counts) < len(state), curves.ratios(EVEN)[0], 0.0)
+    index = int(np.argmax(ratios))
     values = np.concatenate(curves.values(EVEN), axis=1)[0]
-    return float(ratios[worst]), float(values[worst]), labels.every[worst]
+    return float(ratios[index]), float(values[index]), labels.every[index]
 
 
 def within_torque_limits(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]) -> State:
@@ -163,7 +163,7 @@ def _curves(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"
     return Curves(source.at(q, shape[0]), shape), q
 
 
-def joined(source: RobotQuantities, state: State, at: float, order: int) -> tuple[Path, float]:
+def joined(source: RobotQuantities, state: State, junction: float, order: int) -> tuple[Path, float]:
     """Return a path that starts in a state at a rate of 1 and joins another path, and the value of s at the junction.
 
     Raises
@@ -172,15 +172,15 @@ def joined(source: RobotQuantities, state: State, at: float, order: int) -> tupl
         If no curve from the state keeps the limits; the message names the limit.
     """
     path, count = source.path, max(MET, order + 1)
-    p = path.derivatives(np.array([at]), count - 1)[0]
-    rate = steady_rate(source, at)
+    p = path.derivatives(np.array([junction]), count - 1)[0]
+    rate = steady_rate(source, junction)
     ends = p * rate ** np.arange(count)[:, None]
-    duration = max(first_duration(source, state, ends), SHORTEST * (path.stop - at) / rate)
-    curve, too_short = joining_curve(source, state, ends, duration), 0.0
+    duration = max(first_duration(source, state, ends), SHORTEST * (path.stop - junction) / rate)
+    curve, short_duration = joining_curve(source, state, ends, duration), 0.0
     for _ in range(DURATIONS):
         if not curve.over:
             break
-        too_short, duration = duration, duration * float(np.clip(1 + curve.over, *LONGER))
+        short_duration, duration = duration, duration * float(np.clip(1 + curve.over, *LONGER))
         curve = joining_curve(source, state, ends, duration)
     else:
         amount = f" by {100 * curve.over:.2g} %" if np.isfinite(curve.over) else ""
@@ -189,30 +189,30 @@ def joined(source: RobotQuantities, state: State, at: float, order: int) -> tupl
         )
         raise SolveError(message, name="state")
     for _ in range(SHORTENED):
-        if duration < CLOSE * too_short or not too_short:
+        if duration < CLOSE * short_duration or not short_duration:
             break
-        middle = float(np.sqrt(too_short * duration))
+        middle = float(np.sqrt(short_duration * duration))
         shorter = joining_curve(source, state, ends, middle)
         if shorter.over:
-            too_short = middle
+            short_duration = middle
         else:
             curve, duration = shorter, middle
-    return _path_of(path, at, rate, curve), duration
+    return _path_of(path, junction, rate, curve), duration
 
 
-def steady_rate(source: RobotQuantities, at: float) -> float:
+def steady_rate(source: RobotQuantities, s: float) -> float:
     """Return the rate at a place of the path that uses half of the limits."""
-    shape = np.array([[at], [1.0], [0.0], [0.0], [0.0]])
+    shape = np.array([[s], [1.0], [0.0], [0.0], [0.0]])
     curves = Curves(source(shape[0]), shape)
 
-    def used(z: float) -> float:
+    def utilization(z: float) -> float:
         return float(curves.ratios(z * EVEN).max())
 
-    z, rest = 1.0, used(0.0)
-    most = max(USED, (1 + rest) / 2)
-    while used(z) > most and z > 1e-12:
+    z, rest_value = 1.0, utilization(0.0)
+    target = max(USED, (1 + rest_value) / 2)
+    while utilization(z) > target and z > 1e-12:
         z /= 1.5
-    while used(1.2 * z) <= most and z < 1e12:
+    while utilization(1.2 * z) <= target and z < 1e12:
         z *= 1.2
     return float(np.sqrt(z))
 
@@ -224,20 +224,20 @@ def first_duration(source: RobotQuantities, state: State, ends: Float[np.ndarray
     def bounds(field: str) -> np.ndarray:
         return np.array([getattr(x, field) or np.inf for x in limits])
 
-    way, turn = np.abs(ends[0] - state[0]), np.abs(ends[1] - state[1])
+    distance, turn = np.abs(ends[0] - state[0]), np.abs(ends[1] - state[1])
     speed = max(float(np.linalg.norm(state[1])), float(np.linalg.norm(ends[1])))
-    least = max(float((way / bounds("velocity")).max()), float((turn / bounds("acceleration")).max()))
-    return least or float(np.linalg.norm(way)) / speed
+    duration = max(float((distance / bounds("velocity")).max()), float((turn / bounds("acceleration")).max()))
+    return duration or float(np.linalg.norm(distance)) / speed
 
 
-def _path_of(path: Path, at: float, rate: float, curve: JoiningCurve) -> Path:
+def _path_of(path: Path, s0: float, rate: float, curve: JoiningCurve) -> Path:
     from scipy.interpolate import BSpline
 
     from jounce.trajectory.splines import local_powers
 
     splines = curve.splines
-    begins, until = splines.ends[:-1], float(splines.ends[-1])
+    begins, stop = splines.ends[:-1], float(splines.ends[-1])
     powers = local_powers(BSpline(splines.knots, curve.coefficients, splines.degree), begins, splines.degree)
     return extended_path(
-        path, at, rate, [SmoothPieces(begins, powers[:, :, k], until) for k in range(powers.shape[2])], until
+        path, s0, rate, [SmoothPieces(begins, powers[:, :, k], stop) for k in range(powers.shape[2])], stop
     )

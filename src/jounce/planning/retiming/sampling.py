@@ -62,8 +62,8 @@ def fit_to_samples(
     period, hand_over = 1 / rate, trajectory.report.hand_over
     if trajectory.stop < LEAST * period:
         raise TrajectoryError(f"gives fewer than {LEAST} samples in {trajectory.stop:g} s; choose more", value=rate)
-    whole = abs(trajectory.stop / period - round(trajectory.stop / period)) <= WHOLE * trajectory.stop / period
-    if lasting and not whole:
+    is_whole = abs(trajectory.stop / period - round(trajectory.stop / period)) <= WHOLE * trajectory.stop / period
+    if lasting and not is_whole:
         message = f"{trajectory.stop:.9g} s are not a number of whole periods; choose another rate, or duration"
         raise TrajectoryError(message, value=rate)
     slowed = 1.0
@@ -76,16 +76,16 @@ def fit_to_samples(
         positions = slower.derivatives(times, 0)[:, 0]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SampleWarning)
-            read = JointTrajectory.from_samples(times, positions, slower.names, degree)
-            report = worst = check_motion(robot, read, limits, hand_over=hand_over, loads=slower.loads)
+            sampled = JointTrajectory.from_samples(times, positions, slower.names, degree)
+            report = checked = check_motion(robot, sampled, limits, hand_over=hand_over, loads=slower.loads)
         if report.kept:
-            worst = check_motion(robot, slower, limits, hand_over=True, loads=slower.loads)
-            if worst.kept:
-                slower.report = dataclasses.replace(worst, ends=trajectory.report.ends, hand_over=hand_over)
+            checked = check_motion(robot, slower, limits, hand_over=True, loads=slower.loads)
+            if checked.kept:
+                slower.report = dataclasses.replace(checked, ends=trajectory.report.ends, hand_over=hand_over)
                 return slower, report
-        over = max((worst.worst.ratio or 1.0) if worst.worst else 1.0, 1.0) - 1
-        note = "" if worst.worst is None else f" of the {worst.worst.quantity} of {worst.worst.joint}"
-        slowed = max(slowed, float(periods) * period / trajectory.stop) * (1 + min(over / 2, 0.05)) + period / 10
+        excess = max((checked.worst.ratio or 1.0) if checked.worst else 1.0, 1.0) - 1
+        note = "" if checked.worst is None else f" of the {checked.worst.quantity} of {checked.worst.joint}"
+        slowed = max(slowed, float(periods) * period / trajectory.stop) * (1 + min(excess / 2, 0.05)) + period / 10
     message = (
         f"splines of degree {degree} through samples at this rate break the limit{note}; "
         f"choose a higher rate, or a smoother motion (order){', or a longer duration' if lasting else ''}"

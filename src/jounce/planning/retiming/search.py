@@ -93,30 +93,30 @@ class Search:
         low, high = 0.0, 1.0
         for _ in range(BISECTIONS):
             middle = (low + high) / 2
-            below = float(self.parameter.derivatives(np.array([middle]), 0)[0, 0]) < s
-            low, high = (middle, high) if below else (low, middle)
+            is_below = float(self.parameter.derivatives(np.array([middle]), 0)[0, 0]) < s
+            low, high = (middle, high) if is_below else (low, middle)
         return high
 
     def extend(self, points: _Points, enforced: Bool[np.ndarray, " point"]) -> None:
         """Add values of u at which limits are checked; `enforced` points have nearby limits in the first program."""
-        before, joined = self.points, np.concatenate([self.points, points])
-        self.points, first = np.unique(joined, return_index=True)
+        old_points, all_points = self.points, np.concatenate([self.points, points])
+        self.points, first = np.unique(all_points, return_index=True)
         self.enforced = np.concatenate([self.enforced, enforced])[first]
         self.shape = self.parameter.derivatives(self.points, 4)
         quantities = self.source(self.shape[0])
-        left_out = {"rate_lower": (3, -np.inf), "rate_upper": (3, np.inf), "fourth_bounds": (4, np.inf)}
-        free = {
-            field: np.full_like(getattr(quantities, field), none)
-            for field, (level, none) in left_out.items()
+        omitted = {"rate_lower": (3, -np.inf), "rate_upper": (3, np.inf), "fourth_bounds": (4, np.inf)}
+        unlimited = {
+            field: np.full_like(getattr(quantities, field), no_bound)
+            for field, (level, no_bound) in omitted.items()
             if level > self.limit_level
         }
-        quantities = dataclasses.replace(quantities, **free)
+        quantities = dataclasses.replace(quantities, **unlimited)
         self.curves = Curves(quantities, self.shape)
         self.matrices = self.basis.matrices(self.points)
         self.compact = self.basis.compact(self.points, self.matrices)
-        at, shape = np.searchsorted(self.points, before), (len(self.points), len(self.labels.every))
-        (prices, held), self.prices, self.held = (self.prices, self.held), np.zeros(shape), np.zeros(shape, bool)
-        self.prices[at], self.held[at] = prices, held
+        indices, shape = np.searchsorted(self.points, old_points), (len(self.points), len(self.labels.every))
+        (prices, is_held), self.prices, self.held = (self.prices, self.held), np.zeros(shape), np.zeros(shape, bool)
+        self.prices[indices], self.held[indices] = prices, is_held
 
     @property
     def largest_z(self) -> float:
@@ -135,14 +135,14 @@ class Search:
 
     def level(self) -> float:
         """Return a constant z near the largest that exceeds no limit."""
-        z, one = min(1.0, self.largest_z), np.ones(self.basis.count)
+        z, ones = min(1.0, self.largest_z), np.ones(self.basis.count)
 
-        def worst(z: float) -> float:
-            return float(np.max(self.curves.ratios(self.at(z * one))))
+        def max_ratio(z: float) -> float:
+            return float(np.max(self.curves.ratios(self.at(z * ones))))
 
-        while worst(z) > 1 and z > 1e-12:
+        while max_ratio(z) > 1 and z > 1e-12:
             z /= 4
-        while z * 1.2 <= min(self.largest_z, MOST) and worst(z * 1.2) <= 1:
+        while z * 1.2 <= min(self.largest_z, MOST) and max_ratio(z * 1.2) <= 1:
             z *= 1.2
         return z
 
@@ -156,8 +156,8 @@ class Search:
         """
         x, cost = start, self._cost(start) if settled else np.inf
         ratios = self.curves.ratios(self.at(x))
-        near = 0 if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR
-        chosen = self.enforced[:, None] & (ratios > near) | _peaks(ratios) & (ratios > 1)
+        threshold = 0 if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR
+        chosen = self.enforced[:, None] & (ratios > threshold) | _peaks(ratios) & (ratios > 1)
         if settled:
             chosen |= self.held & (ratios > HELD_NEAR)
         for self.rounds in range(1, rounds + 1):
@@ -168,10 +168,10 @@ class Search:
                     raise
                 break  # the solver reached its accuracy, and its last law is the result
             ratios = self.curves.ratios(self.at(x))
-            new = self._cost(x)
-            over = float(ratios.max()) - 1
-            change, cost = abs(cost - new) / new, new
-            if over < EXCEEDED and change < SETTLED:
+            new_cost = self._cost(x)
+            excess = float(ratios.max()) - 1
+            change, cost = abs(cost - new_cost) / new_cost, new_cost
+            if excess < EXCEEDED and change < SETTLED:
                 break
             chosen |= _peaks(ratios) & (ratios > 1 + EXCEEDED / 10)
         self.held = chosen
@@ -184,28 +184,28 @@ class Search:
 
     def _improved(self, x: _Points, chosen: np.ndarray, *, near: bool) -> _Points:
         """Return the solution of the program about a law, expanded to second order if `near` the fastest."""
-        program, labels, at = self._program(x, chosen)
+        program, labels, points = self._program(x, chosen)
         scale = float(np.mean(x))
         if near:
             program = dataclasses.replace(program, about=self.node_matrix @ x / scale)
         solution = solve_program(program)
         if solution.coefficients is None:
-            raise self._infeasibility_error(program, labels, at)
+            raise self._infeasibility_error(program, labels, points)
         prices = np.zeros(chosen.shape)
-        np.add.at(prices, (at, labels), solution.prices[: len(at)])
-        counted = np.arange(chosen.shape[1]) < len(self.labels.first)
+        np.add.at(prices, (points, labels), solution.prices[: len(points)])
+        is_first_order = np.arange(chosen.shape[1]) < len(self.labels.first)
         # limits of first order are squared in the program: a relative increase raises the bound by twice as much
-        self.prices = prices * np.where(counted, 2.0, 1.0) / np.sqrt(scale)
+        self.prices = prices * np.where(is_first_order, 2.0, 1.0) / np.sqrt(scale)
         return solution.coefficients * scale
 
-    def _infeasibility_error(self, program: Program, labels: np.ndarray, at: np.ndarray) -> SolveError:
+    def _infeasibility_error(self, program: Program, labels: np.ndarray, points: np.ndarray) -> SolveError:
         """Return the error of a program without a solution, which names the limit with the largest dual variable."""
         elastic = solve_program(program, elastic=True)
-        prices = elastic.prices[: len(at)]
+        prices = elastic.prices[: len(points)]
         if elastic.coefficients is None or not prices.size or elastic.slack < 1e-5:
             return SolveError("the cone program has no solution that can be computed; try another number of cells")
-        worst = int(np.argmax(prices))
-        label, s = self.labels.every[labels[worst]], float(self.shape[0][at[worst]])
+        index = int(np.argmax(prices))
+        label, s = self.labels.every[labels[index]], float(self.shape[0][points[index]])
         message = (
             f"no time law with these rates at the ends keeps the limits: the {label.word} of {label.owner} at "
             f"s = {s:.6g} would exceed its limit; choose smaller rates"
@@ -220,13 +220,13 @@ class Search:
     def peaks(self, law: RateLaw, zooms: int = ZOOMS) -> tuple[_Points, _Points]:
         """Return the positions and ratios of the highest peaks, also between the points."""
         ratios = self.curves.ratios(law.at(self.points))
-        at, curve = np.nonzero(_peaks(ratios) & (ratios > min(float(ratios.max()), 1.0) - CLOSE))
-        neighbors = np.clip(at + np.array([[-1], [0], [1]]), 0, len(self.points) - 1)
-        u, values, every = self.points[neighbors], ratios[neighbors, curve], np.arange(len(at))
+        indices, curve = np.nonzero(_peaks(ratios) & (ratios > min(float(ratios.max()), 1.0) - CLOSE))
+        neighbors = np.clip(indices + np.array([[-1], [0], [1]]), 0, len(self.points) - 1)
+        u, values, columns = self.points[neighbors], ratios[neighbors, curve], np.arange(len(indices))
         for _ in range(zooms):
-            more = _about_vertex(u, values)
-            u = np.concatenate([u, more])
-            more_values = self.ratios_at(more.reshape(-1), law).reshape(*more.shape, -1)[:, every, curve]
+            added = _about_vertex(u, values)
+            u = np.concatenate([u, added])
+            more_values = self.ratios_at(added.reshape(-1), law).reshape(*added.shape, -1)[:, columns, curve]
             values = np.concatenate([values, more_values])
             sequence = np.argsort(u, axis=0, kind="stable")
             u, values = np.take_along_axis(u, sequence, axis=0), np.take_along_axis(values, sequence, axis=0)
@@ -242,17 +242,17 @@ class Search:
         law = self.run(start)
         for _ in range(EXCHANGES):
             positions, ratios = self.peaks(law, 2)
-            over = ratios > 1 + EXCEEDED
-            if not over.any():
+            is_exceeded = ratios > 1 + EXCEEDED
+            if not is_exceeded.any():
                 break
-            self.extend(*self._among_points(positions[over]))
+            self.extend(*self._among_points(positions[is_exceeded]))
             law = self.run(law.coefficients, settled=True)
         return self.slowed_to_limits(law)
 
     def _among_points(self, positions: _Points) -> tuple[_Points, Bool[np.ndarray, " point"]]:
         """Return positions between points, and those halfway to the neighboring points, all of them enforced."""
-        after = np.clip(np.searchsorted(self.points, positions), 1, len(self.points) - 1)
-        halfway = (positions + self.points[np.stack([after - 1, after])]) / 2
+        next_index = np.clip(np.searchsorted(self.points, positions), 1, len(self.points) - 1)
+        halfway = (positions + self.points[np.stack([next_index - 1, next_index])]) / 2
         points = np.unique(np.append(halfway.reshape(-1), positions))
         return points, np.ones(len(points), bool)
 
@@ -264,16 +264,16 @@ class Search:
         SolveError
             If slowing does not suffice.
         """
-        before, step = np.inf, np.inf
+        previous, step = np.inf, np.inf
         for _ in range(SLOWINGS):
-            over = float(self.peaks(law)[1].max()) - 1 + SPARE
-            if over <= SPARE / 2:
+            excess = float(self.peaks(law)[1].max()) - 1 + SPARE
+            if excess <= SPARE / 2:
                 return law
-            if over > HOPELESS:
+            if excess > HOPELESS:
                 break
             # a torque that mostly bears weight decreases by a small fraction of the slowing
-            fell = (before - over) / step if np.isfinite(step) else 1.0
-            step, before = over / float(np.clip(fell, LEAST_FALL, 1.0)), over
+            fell = (previous - excess) / step if np.isfinite(step) else 1.0
+            step, previous = excess / float(np.clip(fell, LEAST_FALL, 1.0)), excess
             law = self.with_margin(law, step)
         message = (
             "the time law still exceeds its limits after tightening them; smooth the path where it bends sharply, or "
@@ -301,12 +301,12 @@ class Search:
         if not any(self.conditions.rates) and self.peaks(slowed)[1].max() <= 1:
             return slowed
         law = self.run(law.coefficients, settled=True)
-        inside = np.zeros(self.basis.count)
-        inside[self.basis.degree + 1 : -self.basis.degree - 1] = 1.0  # given rates at the ends stay
+        inner = np.zeros(self.basis.count)
+        inner[self.basis.degree + 1 : -self.basis.degree - 1] = 1.0  # given rates at the ends stay
         for _ in range(EVENED):
-            by = law.duration / duration
-            law = dataclasses.replace(law, coefficients=law.coefficients * by ** (2 * inside))
-            if abs(by - 1) < SAME:
+            ratio = law.duration / duration
+            law = dataclasses.replace(law, coefficients=law.coefficients * ratio ** (2 * inner))
+            if abs(ratio - 1) < SAME:
                 break
         return law
 
@@ -317,18 +317,18 @@ class Search:
         law = self.at(x)
         eased = max(float(self.curves.fourth_ratio(law)) / EASE, 1.0)
         slopes, right, curve = self.curves.rows(law, eased)
-        at, row = np.nonzero(chosen[:, curve] & np.isfinite(right))
+        point_index, row = np.nonzero(chosen[:, curve] & np.isfinite(right))
         first, dense = self.compact
-        data = np.einsum("kr,krj->rj", slopes[:, at, row] * scale, dense[:, at])
-        columns = first[at][:, None] + np.arange(data.shape[1])
+        data = np.einsum("kr,krj->rj", slopes[:, point_index, row] * scale, dense[:, point_index])
+        columns = first[point_index][:, None] + np.arange(data.shape[1])
         # positive coefficients make the spline positive everywhere
         count = self.basis.count
-        begins = np.append(np.arange(len(at)) * data.shape[1], data.size + np.arange(count + 1))
+        begins = np.append(np.arange(len(point_index)) * data.shape[1], data.size + np.arange(count + 1))
         entries = np.append(data.reshape(-1), np.full(count, -1.0)), np.append(columns.reshape(-1), np.arange(count))
-        rows = sparse.csr_matrix((*entries, begins), shape=(len(at) + count, count))
+        rows = sparse.csr_matrix((*entries, begins), shape=(len(point_index) + count, count))
         squared = np.where(curve[row] < len(self.labels.first), 2.0, 1.0)
-        margin = self.margin * self._margin_shares(at, curve[row])
-        right = np.append(right[at, row] - margin * squared, np.full(self.basis.count, -FLOOR))
+        margin = self.margin * self._margin_shares(point_index, curve[row])
+        right = np.append(right[point_index, row] - margin * squared, np.full(self.basis.count, -FLOOR))
         if self.labels.fourth and self.limit_level == 4:  # limits of fourth order are accurate only near the last law
             rows = sparse.vstack([rows, sparse.identity(self.basis.count), -sparse.identity(self.basis.count)])
             right = np.concatenate([right, TRUST * np.abs(x) / scale, -x / TRUST / scale])
@@ -338,25 +338,25 @@ class Search:
         vectors = self.curves.vector
         bounds = self.curves.quantities.vector_bounds
         first = sum(len(x) for x in (self.labels.first, self.labels.second, self.labels.rates))
-        points, which = np.nonzero(chosen[:, first : first + len(self.labels.vectors)] & np.isfinite(bounds))
-        size = bounds[points, which]
+        points, column = np.nonzero(chosen[:, first : first + len(self.labels.vectors)] & np.isfinite(bounds))
+        size = bounds[points, column]
         repeated = np.repeat(points, 3)
         cones = sum(
-            sparse.diags((part[points, which] / size[:, None] * factor * scale).reshape(-1)) @ matrix[repeated]
-            for part, factor, matrix in zip(vectors, (0.5, 1.0), self.matrices[1::-1], strict=True)
+            sparse.diags((block[points, column] / size[:, None] * factor * scale).reshape(-1)) @ matrix[repeated]
+            for block, factor, matrix in zip(vectors, (0.5, 1.0), self.matrices[1::-1], strict=True)
         )
-        equal, equal_right = self._end_equations(scale)
+        end_rows, end_values = self._end_equations(scale)
         cone_bounds, duration = np.full(len(size), 1 - self.margin), self.duration and self.duration * np.sqrt(scale)
-        bounded = rows, right, sparse.csr_matrix(cones), cone_bounds, equal, equal_right
-        return Program(self.weights, self.node_matrix, *bounded, duration), curve[row], at
+        bounded = rows, right, sparse.csr_matrix(cones), cone_bounds, end_rows, end_values
+        return Program(self.weights, self.node_matrix, *bounded, duration), curve[row], point_index
 
-    def _margin_shares(self, at: np.ndarray, curve: np.ndarray) -> _Points:
+    def _margin_shares(self, points: np.ndarray, curve: np.ndarray) -> _Points:
         """Return the fraction of the margin that rows keep, as a given state may be at its limits."""
         if not self.conditions.further:
-            return np.ones(len(at))
+            return np.ones(len(points))
         counts = [len(self.labels.first), len(self.labels.second), len(self.labels.rates)]
-        given = curve < sum(counts[: 1 + len(self.conditions.further)])
-        return np.where(given, np.minimum(self.points[at] * self.basis.cells / GIVEN, 1.0) ** 2, 1.0)
+        is_given = curve < sum(counts[: 1 + len(self.conditions.further)])
+        return np.where(is_given, np.minimum(self.points[points] * self.basis.cells / GIVEN, 1.0) ** 2, 1.0)
 
     def _end_equations(self, scale: float) -> tuple[object, _Points]:
         """Return the equations for given rates at the ends."""
@@ -364,11 +364,11 @@ class Search:
 
         ends = np.array([0.0, 1.0])
         slopes = self.parameter.derivatives(ends, 1)[1]
-        given = [(k, rate) for k, rate in enumerate(self.conditions.rates) if rate]
-        values = [(rate / slopes[k]) ** 2 / scale for k, rate in given]
-        if not given:
+        fixed_rates = [(k, rate) for k, rate in enumerate(self.conditions.rates) if rate]
+        values = [(rate / slopes[k]) ** 2 / scale for k, rate in fixed_rates]
+        if not fixed_rates:
             return sparse.csr_matrix((0, self.basis.count)), np.zeros(0)
-        rows = [self.basis.matrices(ends[[k for k, _ in given]], 0)[0]]
+        rows = [self.basis.matrices(ends[[k for k, _ in fixed_rates]], 0)[0]]
         if further := self.conditions.further:
             # s'' = s_u z_u / 2 + s_uu z, and s''' / u' = s_u z_uu / 2 + 3/2 s_uu z_u + s_uuu z
             s1, s2, s3 = self.parameter.derivatives(ends[:1], 3)[1:, 0]
@@ -382,12 +382,12 @@ class Search:
 
 def _about_vertex(u: Float[np.ndarray, "3 peak"], values: Float[np.ndarray, "3 peak"]) -> Float[np.ndarray, "3 peak"]:
     """Return the vertex of a parabola through three points, or the middle point, with a point on each side."""
-    before, after = u[1] - u[0], u[2] - u[1]
-    fall = (values[1] - values[0]) * after, (values[1] - values[2]) * before
+    left, right = u[1] - u[0], u[2] - u[1]
+    fall = (values[1] - values[0]) * right, (values[1] - values[2]) * left
     with np.errstate(divide="ignore", invalid="ignore"):
-        step = (fall[0] * after - fall[1] * before) / (2 * (fall[0] + fall[1]))
-    step = np.clip(np.where(np.isfinite(step), step, 0.0), -before, after)
-    vertex = u[1] + np.where(np.abs(step) < 1e-3 * (before + after), 0.25 * ASIDE * (after - before), step)
+        step = (fall[0] * right - fall[1] * left) / (2 * (fall[0] + fall[1]))
+    step = np.clip(np.where(np.isfinite(step), step, 0.0), -left, right)
+    vertex = u[1] + np.where(np.abs(step) < 1e-3 * (left + right), 0.25 * ASIDE * (right - left), step)
     return np.stack([vertex - ASIDE * (vertex - u[0]), vertex, vertex + ASIDE * (u[2] - vertex)])
 
 

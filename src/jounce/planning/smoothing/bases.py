@@ -85,9 +85,9 @@ def penalty_root(repeated: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
         derivative, repeated, degree = step.tocsr() @ derivative, repeated[1:-1], degree - 1
     nodes, shares = np.polynomial.legendre.leggauss(degree + 1)  # exact for squares
     lengths = np.diff(knots)
-    at = knots[:-1, None] + lengths[:, None] * (nodes + 1) / 2
+    points = knots[:-1, None] + lengths[:, None] * (nodes + 1) / 2
     root = np.sqrt(weights[:, None] * lengths[:, None] / 2 * shares)
-    return sparse.diags(root.reshape(-1)) @ BSpline.design_matrix(at.reshape(-1), repeated, degree) @ derivative
+    return sparse.diags(root.reshape(-1)) @ BSpline.design_matrix(points.reshape(-1), repeated, degree) @ derivative
 
 
 def parts_of(count: int) -> Iterator[slice]:
@@ -111,16 +111,16 @@ def cost(samples: Samples, weights: Float[np.ndarray, " cell"]) -> tuple[Any, Fl
     knots = samples.knots
     count = len(knots) + DEGREE - 1
     bands, right = np.zeros((DEGREE + 1, count)), np.zeros(count)
-    for some in parts_of(len(samples)):
-        matrix = values_at(samples.times(some), knots)
-        own = slice(int(matrix.indices.min()), int(matrix.indices.max()) + 1)
-        matrix = matrix[:, own]
-        bands[:, own] += banded(matrix.T @ matrix)
-        right[own] += matrix.T @ samples.values(some)
+    for chunk in parts_of(len(samples)):
+        matrix = values_at(samples.times(chunk), knots)
+        columns = slice(int(matrix.indices.min()), int(matrix.indices.max()) + 1)
+        matrix = matrix[:, columns]
+        bands[:, columns] += banded(matrix.T @ matrix)
+        right[columns] += matrix.T @ samples.values(chunk)
     repeated = whole(knots)
-    for some in parts_of(len(weights)):
-        root = penalty_root(repeated[some.start : some.stop + 2 * DEGREE + 1], weights[some])
-        bands[:, some.start : some.stop + DEGREE] += banded(root.T @ root)
+    for chunk in parts_of(len(weights)):
+        root = penalty_root(repeated[chunk.start : chunk.stop + 2 * DEGREE + 1], weights[chunk])
+        bands[:, chunk.start : chunk.stop + DEGREE] += banded(root.T @ root)
     upper: Any = sparse.dia_array((bands[::-1], np.arange(DEGREE + 1)), shape=(count, count)).tocsr()
     return upper + sparse.triu(upper, 1).T.tocsr(), right
 

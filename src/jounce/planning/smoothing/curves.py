@@ -70,16 +70,16 @@ def smoothed_curve(
         If no spline is within the deviation; the message gives the instant.
     """
     knots = laid_knots(times, estimates, dwells)
-    far = np.zeros(1, int)
+    missed = np.zeros(1, int)
     for _ in range(HALVINGS):
         try:
             return _on_knots(times, values, deviation, knots, estimates, dwells)
         except TooFarError as reason:
-            far = reason.samples
-            knots = _halved(knots, times, far)
-    at = float(times[far[0]])
+            missed = reason.samples
+            knots = _halved(knots, times, missed)
+    time = float(times[missed[0]])
     message = (
-        f"no smooth motion stays within the deviation of the samples near t = {time_text(at)} s; allow a larger one"
+        f"no smooth motion stays within the deviation of the samples near t = {time_text(time)} s; allow a larger one"
     )
     raise SolveError(message, name="deviation", value=deviation)
 
@@ -90,23 +90,23 @@ def laid_knots(
     """Return knots, which include the ends of dwells, at distances set by the cutoff frequency."""
     ends = [times[0], *(t for d in dwells for t in (times[d.first], times[d.last])), times[-1]]
     ends = np.unique(ends)
-    at = np.array([(s.start + s.stop) / 2 for s in estimates])
+    middles = np.array([(s.start + s.stop) / 2 for s in estimates])
     logarithms = np.log(CELL / np.array([s.cutoff for s in estimates]))
-    shortest = float(np.median(np.diff(times), overwrite_input=True))
-    least = min(s.stop - s.start for s in estimates) / LOOKS
-    still = {(float(times[d.first]), float(times[d.last])) for d in dwells}
-    parts = []
+    sample_step = float(np.median(np.diff(times), overwrite_input=True))
+    min_step = min(s.stop - s.start for s in estimates) / LOOKS
+    dwell_ends = {(float(times[d.first]), float(times[d.last])) for d in dwells}
+    grids = []
     for a, b in itertools.pairwise(ends):
-        if (float(a), float(b)) in still:
-            parts.append(np.array([a]))
+        if (float(a), float(b)) in dwell_ends:
+            grids.append(np.array([a]))
             continue
-        grid = np.linspace(a, b, 2 + int((b - a) / max(shortest, least)))
-        length = np.maximum(np.exp(np.interp(grid, at, logarithms)), shortest)
+        grid = np.linspace(a, b, 2 + int((b - a) / max(sample_step, min_step)))
+        length = np.maximum(np.exp(np.interp(grid, middles, logarithms)), sample_step)
         count = np.append(0.0, np.cumsum(np.diff(grid) * 2 / (length[1:] + length[:-1])))
         samples = int(np.searchsorted(times, b) - np.searchsorted(times, a))
         cells = max(min(FEWEST, samples), int(np.ceil(count[-1])), 1)
-        parts.append(np.interp(np.arange(cells) * (count[-1] / cells), count, grid))
-    return np.append(np.concatenate(parts), ends[-1])
+        grids.append(np.interp(np.arange(cells) * (count[-1] / cells), count, grid))
+    return np.append(np.concatenate(grids), ends[-1])
 
 
 def _halved(
@@ -114,11 +114,11 @@ def _halved(
 ) -> Float[np.ndarray, " halved"]:
     """Return knots at half the distance near some samples, but no closer than half of the time between samples."""
     cells = np.clip(np.searchsorted(knots, times[samples], side="right") - 1, 0, len(knots) - 2)
-    near = np.zeros(len(knots) - 1, bool)
+    is_near = np.zeros(len(knots) - 1, bool)
     for offset in range(-HALVED, HALVED + 1):
-        near[np.clip(cells + offset, 0, len(near) - 1)] = True
-    near &= np.diff(knots) > np.median(np.diff(times), overwrite_input=True) / 2
-    return np.sort(np.append(knots, ((knots[:-1] + knots[1:]) / 2)[near]))
+        is_near[np.clip(cells + offset, 0, len(is_near) - 1)] = True
+    is_near &= np.diff(knots) > np.median(np.diff(times), overwrite_input=True) / 2
+    return np.sort(np.append(knots, ((knots[:-1] + knots[1:]) / 2)[is_near]))
 
 
 def _on_knots(
@@ -131,19 +131,19 @@ def _on_knots(
 ) -> Curve:
     samples = Samples(times, values, knots)
     middles = (knots[:-1] + knots[1:]) / 2
-    at = np.array([(s.start + s.stop) / 2 for s in estimates])
-    weights = np.exp(np.interp(middles, at, np.log([s.weight for s in estimates]))) / samples.scale**DEGREE
+    centers = np.array([(s.start + s.stop) / 2 for s in estimates])
+    weights = np.exp(np.interp(middles, centers, np.log([s.weight for s in estimates]))) / samples.scale**DEGREE
     system, right = cost(samples, weights)
-    coefficients, free = np.zeros(len(right)), np.ones(len(right), bool)
+    coefficients, is_free = np.zeros(len(right)), np.ones(len(right), bool)
     for dwell in dwells:
-        first = int(np.searchsorted(knots, times[dwell.first]))
-        last = int(np.searchsorted(knots, times[dwell.last]))
-        own = slice(first, last + DEGREE)
-        coefficients[own], free[own] = dwell.position - samples.middle, False
-    for run in _runs(free):
+        start = int(np.searchsorted(knots, times[dwell.first]))
+        stop = int(np.searchsorted(knots, times[dwell.last]))
+        columns = slice(start, stop + DEGREE)
+        coefficients[columns], is_free[columns] = dwell.position - samples.middle, False
+    for run in _runs(is_free):
         coefficients[run] = _solved(system, right, coefficients, run)
     problem = _Problem(samples, system, right, deviation)
-    return Curve(knots, problem.within(coefficients, free) + samples.middle, problem.away)
+    return Curve(knots, problem.within(coefficients, is_free) + samples.middle, problem.away)
 
 
 def _runs(chosen: Bool[np.ndarray, " spline"]) -> list[slice]:
@@ -156,9 +156,9 @@ def _solved(system: Any, right: np.ndarray, coefficients: np.ndarray, run: slice
     """Return the coefficients of a run that minimize the cost, with all others fixed."""
     from scipy.linalg import solveh_banded
 
-    fixed = coefficients.copy()
-    fixed[run] = 0.0
-    target = right[run] - system[run] @ fixed
+    others = coefficients.copy()
+    others[run] = 0.0
+    target = right[run] - system[run] @ others
     bands = banded(system[run, run])
     bands[-1] *= 1 + 1e-14
     return solveh_banded(bands, target)
@@ -174,21 +174,21 @@ class _Problem:
     deviation: float
     away: float = 0.0
 
-    def within(self, coefficients: np.ndarray, free: np.ndarray) -> Float[np.ndarray, " spline"]:
+    def within(self, coefficients: np.ndarray, is_free: np.ndarray) -> Float[np.ndarray, " spline"]:
         """Return the coefficients of a spline within the deviation."""
         for _ in range(ROUNDS):
-            far = self._far(coefficients)
-            if not len(far):
+            missed = self._far(coefficients)
+            if not len(missed):
                 return coefficients
-            moved = np.zeros(len(coefficients), bool)
-            for cell in np.unique(self._cells(far)):
-                moved[max(cell - PADDING, 0) : cell + DEGREE + 1 + PADDING] = True
-            moved &= free
-            if not moved.any():
-                raise TooFarError(far)
-            for run in _runs(moved):
-                for part in _parts(run):
-                    self._move(coefficients, part)
+            is_moved = np.zeros(len(coefficients), bool)
+            for cell in np.unique(self._cells(missed)):
+                is_moved[max(cell - PADDING, 0) : cell + DEGREE + 1 + PADDING] = True
+            is_moved &= is_free
+            if not is_moved.any():
+                raise TooFarError(missed)
+            for run in _runs(is_moved):
+                for chunk in _parts(run):
+                    self._move(coefficients, chunk)
         raise TooFarError(self._far(coefficients))
 
     def _cells(self, samples: Int[np.ndarray, " some"]) -> Int[np.ndarray, " some"]:
@@ -200,12 +200,12 @@ class _Problem:
         """Return the samples farther away than the deviation, and store the largest distance."""
         from scipy.interpolate import BSpline
 
-        spline, far, self.away = BSpline(whole(self.samples.knots), coefficients, DEGREE), [np.zeros(0, int)], 0.0
-        for some in parts_of(len(self.samples)):
-            distances = np.abs(spline(self.samples.times(some)) - self.samples.values(some))
+        spline, missed, self.away = BSpline(whole(self.samples.knots), coefficients, DEGREE), [np.zeros(0, int)], 0.0
+        for chunk in parts_of(len(self.samples)):
+            distances = np.abs(spline(self.samples.times(chunk)) - self.samples.values(chunk))
             self.away = max(self.away, float(distances.max()))
-            far.append(some.start + np.flatnonzero(distances > self.deviation))
-        return np.concatenate(far)
+            missed.append(chunk.start + np.flatnonzero(distances > self.deviation))
+        return np.concatenate(missed)
 
     def _move(self, coefficients: np.ndarray, run: slice) -> None:
         """Solve for a run of coefficients such that all samples under its splines are within the deviation."""
@@ -214,16 +214,16 @@ class _Problem:
         clarabel = cone_solver()
         knots = self.samples.knots
         ends = knots[[max(run.start - DEGREE, 0), min(run.stop, len(knots) - 1)]]
-        last = "right" if run.stop >= len(knots) - 1 else "left"
-        rows = np.arange(self.samples.place(ends[0]), self.samples.place(ends[1], last))
+        side = "right" if run.stop >= len(knots) - 1 else "left"
+        rows = np.arange(self.samples.place(ends[0]), self.samples.place(ends[1], side))
         matrix = values_at(self.samples.times(rows), knots)
-        fixed = coefficients.copy()
-        fixed[run] = 0.0
-        own = matrix[:, run]
-        rest = self.samples.values(rows) - matrix @ fixed
-        target = self.right[run] - self.system[run] @ fixed
+        others = coefficients.copy()
+        others[run] = 0.0
+        columns = matrix[:, run]
+        residual = self.samples.values(rows) - matrix @ others
+        target = self.right[run] - self.system[run] @ others
         size = self.deviation
-        bound = np.concatenate([rest / size + INSIDE, INSIDE - rest / size])
+        bounds = np.concatenate([residual / size + INSIDE, INSIDE - residual / size])
         quadratic = sparse.triu(self.system[run, run], format="csc")
         top = float(quadratic.diagonal().max())
         settings = clarabel.DefaultSettings()
@@ -231,15 +231,15 @@ class _Problem:
         solver = clarabel.DefaultSolver(
             quadratic / top,
             -target / (top * size),
-            sparse.vstack([own, -own], format="csc"),
-            bound,
+            sparse.vstack([columns, -columns], format="csc"),
+            bounds,
             [clarabel.NonnegativeConeT(2 * len(rows))],
             settings,
         )
         solution = solver.solve()
         if "Solved" not in str(solution.status):
-            far = rows[np.abs(own @ coefficients[run] - rest) > self.deviation]
-            raise TooFarError(far if len(far) else rows[:1])
+            missed = rows[np.abs(columns @ coefficients[run] - residual) > self.deviation]
+            raise TooFarError(missed if len(missed) else rows[:1])
         coefficients[run] = np.array(solution.x) * size
 
 

@@ -51,9 +51,9 @@ def step_of(values: Float[np.ndarray, " sample"]) -> float:
     step = float(differences.min())
     if np.ptp(values[:SEEN]) > 1e9 * step:
         return 0.0
-    whole = differences / step
-    near = np.abs(whole - np.rint(whole)).max() <= max(AGREE * float(whole.max()), 0.05)
-    return step if near and float(np.ptp(values[:SEEN])) < QUANTA * step * 1e3 and np.mean(whole < 1.5) > 0.02 else 0.0
+    ratios = differences / step
+    fits = np.abs(ratios - np.rint(ratios)).max() <= max(AGREE * float(ratios.max()), 0.05)
+    return step if fits and float(np.ptp(values[:SEEN])) < QUANTA * step * 1e3 and np.mean(ratios < 1.5) > 0.02 else 0.0
 
 
 def noise_of(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> float:
@@ -73,12 +73,12 @@ def dwells(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " samp
         Standard deviation of the noise.
     """
     chosen: list[Dwell] = []
-    taken = np.zeros(len(values), bool)
+    is_taken = np.zeros(len(values), bool)
     for dwell in sorted([*_of_equal(values), *_of_noise(times, values, sigma)], key=lambda x: x.first - x.last):
-        own = slice(dwell.first, dwell.last + 1)
-        if not taken[own].any():  # the longest dwells come first
+        samples = slice(dwell.first, dwell.last + 1)
+        if not is_taken[samples].any():  # the longest dwells come first
             chosen.append(dwell)
-            taken[own] = True
+            is_taken[samples] = True
     return _joined(sorted(chosen, key=lambda dwell: dwell.first), values, sigma)
 
 
@@ -97,14 +97,14 @@ def without_margins(
         Time scales of the motions before and after each dwell, s.
     """
     inner = []
-    for dwell, (before, after) in zip(dwells, scales, strict=True):
+    for dwell, (scale_before, scale_after) in zip(dwells, scales, strict=True):
         first, last = dwell.first, dwell.last
         if first > 0:
-            first = int(np.searchsorted(times, times[first] + before))
+            first = int(np.searchsorted(times, times[first] + scale_before))
         if last < len(times) - 1:
-            last = int(np.searchsorted(times, times[last] - after, side="right")) - 1
-        whole = first == 0 and last == len(times) - 1
-        if whole or (last - first >= LEAST_LEFT and times[last] - times[first] >= min(before, after)):
+            last = int(np.searchsorted(times, times[last] - scale_after, side="right")) - 1
+        is_whole = first == 0 and last == len(times) - 1
+        if is_whole or (last - first >= LEAST_LEFT and times[last] - times[first] >= min(scale_before, scale_after)):
             inner.append(dataclasses.replace(dwell, first=first, last=last))
     return inner
 
@@ -114,11 +114,11 @@ def _joined(dwells: list[Dwell], values: np.ndarray, sigma: float) -> list[Dwell
     result: list[Dwell] = []
     for dwell in dwells:
         if result and dwell.first - result[-1].last <= NEAR * BLOCK:
-            before = result[-1]
-            counts = before.last - before.first + 1, dwell.last - dwell.first + 1
-            if abs(before.position - dwell.position) <= SURE * sigma * np.sqrt(1 / counts[0] + 1 / counts[1]):
-                own = values[before.first : dwell.last + 1]
-                result[-1] = Dwell(before.first, dwell.last, float(own.mean()))
+            previous = result[-1]
+            counts = previous.last - previous.first + 1, dwell.last - dwell.first + 1
+            if abs(previous.position - dwell.position) <= SURE * sigma * np.sqrt(1 / counts[0] + 1 / counts[1]):
+                samples = values[previous.first : dwell.last + 1]
+                result[-1] = Dwell(previous.first, dwell.last, float(samples.mean()))
                 continue
         result.append(dwell)
     return result
@@ -146,25 +146,25 @@ def _of_noise(times: np.ndarray, values: np.ndarray, sigma: float) -> list[Dwell
     if count < LEAST // BLOCK or sigma <= 0:
         return []
     means = values[: count * BLOCK].reshape(count, BLOCK).mean(axis=1)
-    near = SURE * sigma / np.sqrt(BLOCK)
+    tolerance = SURE * sigma / np.sqrt(BLOCK)
     runs, first = [], 0
     while first < count - 1:
         last, low, high = first, means[first], means[first]
-        while last + 1 < count and max(high, means[last + 1]) - min(low, means[last + 1]) <= 2 * near:
+        while last + 1 < count and max(high, means[last + 1]) - min(low, means[last + 1]) <= 2 * tolerance:
             last += 1
             low, high = min(low, means[last]), max(high, means[last])
-        begin, end = first * BLOCK, (last + 1) * BLOCK - 1
+        start, end = first * BLOCK, (last + 1) * BLOCK - 1
         if last == count - 1:
             end = len(values) - 1
-        whole = end - begin + 1
-        lengths = [n for share in SHARES if (n := int(share * whole)) >= LEAST]
-        still = next((n for n in lengths if _still(times[begin : begin + n], values[begin : begin + n], sigma)), 0)
-        if still:  # the first samples of a motion may look like noise
-            end = begin + still - 1
-            begin, end = _within(begin, end, len(values), int(MARGIN * BLOCK))
-            if end - begin >= 2:
-                runs.append(Dwell(begin, end, float(values[begin : end + 1].mean())))
-            first = first + max(1, still // BLOCK)
+        size = end - start + 1
+        lengths = [n for fraction in SHARES if (n := int(fraction * size)) >= LEAST]
+        length = next((n for n in lengths if _still(times[start : start + n], values[start : start + n], sigma)), 0)
+        if length:  # the first samples of a motion may look like noise
+            end = start + length - 1
+            start, end = _within(start, end, len(values), int(MARGIN * BLOCK))
+            if end - start >= 2:
+                runs.append(Dwell(start, end, float(values[start : end + 1].mean())))
+            first = first + max(1, length // BLOCK)
         else:
             first += max(1, (last - first) // 8)
     return runs
@@ -172,14 +172,14 @@ def _of_noise(times: np.ndarray, values: np.ndarray, sigma: float) -> list[Dwell
 
 def _still(times: np.ndarray, values: np.ndarray, sigma: float) -> bool:
     """Return whether samples drift and scatter no more than noise about one position."""
-    since = times - times.mean()
+    elapsed = times - times.mean()
     span = float(times[-1] - times[0])
-    slope = float(since @ values) / float(since @ since)
-    certain = SLOPE * sigma / np.sqrt(float(since @ since)) * span
+    slope = float(elapsed @ values) / float(elapsed @ elapsed)
+    bound = SLOPE * sigma / np.sqrt(float(elapsed @ elapsed)) * span
     half = len(values) // 2
     difference = abs(values[:half].mean() - values[half:].mean())
     scatter = float(values.std())
-    return bool(abs(slope) * span <= certain and scatter <= 1.3 * sigma and difference <= SURE * sigma / np.sqrt(half))
+    return bool(abs(slope) * span <= bound and scatter <= 1.3 * sigma and difference <= SURE * sigma / np.sqrt(half))
 
 
 def _within(first: int, last: int, count: int, margin: int) -> tuple[int, int]:

@@ -82,8 +82,8 @@ class SmoothedTrajectory(JointTrajectory):
         self.deviation, self.joints = deviation, dict(joints)
 
     def __reduce__(self) -> tuple[object, ...]:
-        own = (self.laws.given(), self.start, self.stop, self.times, dict(self.measures), self.deviation, self.joints)
-        return type(self), own
+        state = (self.laws.given(), self.start, self.stop, self.times, dict(self.measures), self.deviation, self.joints)
+        return type(self), state
 
 
 def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
@@ -132,7 +132,7 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
     True
     """
     deviation = positive("deviation", deviation)
-    samples = {name: own for name in trajectory.names if (own := samples_of(trajectory, name)) is not None}
+    samples = {name: pair for name in trajectory.names if (pair := samples_of(trajectory, name)) is not None}
     if not samples:
         message = "no joint goes through samples; there is nothing to be smoothed"
         raise TrajectoryError(message, name="trajectory", value=list(trajectory.names))
@@ -166,10 +166,10 @@ def _doubt(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " samp
 def _check_turns(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> None:
     steps = np.diff(values)
     sizes = np.abs(steps)
-    turned = np.abs(sizes - WHOLE_TURN) < 0.1 * WHOLE_TURN
-    if turned.any() and np.all(sizes[~turned] < 0.1 * WHOLE_TURN):
-        first = int(np.argmax(turned))
-        count = f"; {np.sum(turned)} steps are such" if np.sum(turned) > 1 else ""
+    is_turn = np.abs(sizes - WHOLE_TURN) < 0.1 * WHOLE_TURN
+    if is_turn.any() and np.all(sizes[~is_turn] < 0.1 * WHOLE_TURN):
+        first = int(np.argmax(is_turn))
+        count = f"; {np.sum(is_turn)} steps are such" if np.sum(is_turn) > 1 else ""
         message = (
             f"goes by a whole turn, {steps[first]:.6g}, at t = {time_text(times[first + 1])} s{count}: "
             "count the turns of an angle (numpy.unwrap)"
@@ -183,24 +183,24 @@ def _repeated(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " s
     Dwells do not count, as their motion starts with short steps, and neither do quantization steps of an encoder.
     """
     steps = np.abs(np.diff(values))
-    moving = np.flatnonzero(steps)
-    if len(moving) < FEWEST:
+    moves = np.flatnonzero(steps)
+    if len(moves) < FEWEST:
         return ""
-    stays = np.diff(moving) - 1  # number of repeated samples before each step but the first
-    jumps, after, before = steps[moving[1:-1]], steps[moving[2:]], steps[moving[:-2]]
+    stays = np.diff(moves) - 1  # number of repeated samples before each step but the first
+    jumps, after, before = steps[moves[1:-1]], steps[moves[2:]], steps[moves[:-2]]
     gaps = np.diff(np.unique(values))
-    seen = gaps[gaps > SAME * np.ptp(values)].min()  # the quantization step, if any
-    late = (stays[:-1] > 0) & (jumps > WRITTEN * seen) & (jumps > CATCHES_UP * after)
-    long = late & (stays[:-1] >= LONG) & (jumps > LONG / 2 * np.maximum(after, before))
-    count = int(stays[:-1][late].sum())
-    if count < REPEATED * len(values) and not long.any():
+    quantum = gaps[gaps > SAME * np.ptp(values)].min()  # the quantization step, if any
+    is_late = (stays[:-1] > 0) & (jumps > WRITTEN * quantum) & (jumps > CATCHES_UP * after)
+    is_long = is_late & (stays[:-1] >= LONG) & (jumps > LONG / 2 * np.maximum(after, before))
+    count = int(stays[:-1][is_late].sum())
+    if count < REPEATED * len(values) and not is_long.any():
         return ""
-    chosen = long if count < REPEATED * len(values) else late
+    chosen = is_long if count < REPEATED * len(values) else is_late
     first = int(np.argmax(chosen))
-    at = int(moving[first]) + 2
+    sample = int(moves[first]) + 2
     return (
         f"{int(stays[:-1][chosen].sum())} of {len(values)} samples repeat the one before while the joint moves, the "
-        f"first at t = {time_text(times[at])} s: they are old, and the motion follows them within the "
+        f"first at t = {time_text(times[sample])} s: they are old, and the motion follows them within the "
         "deviation; leave out what repeats"
     )
 
@@ -208,17 +208,17 @@ def _repeated(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " s
 def _outlier(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float) -> str:
     """Return a warning of samples far from their neighbors, with a remedy, or an empty string."""
     steps = np.diff(times)
-    between = (values[:-2] * steps[1:] + values[2:] * steps[:-1]) / (steps[1:] + steps[:-1])
-    off = np.abs(values[1:-1] - between)
-    padded = np.pad(off, NEIGHBORS)
-    near = [padded[NEIGHBORS + k : len(off) + NEIGHBORS + k] for k in range(-NEIGHBORS, NEIGHBORS + 1) if abs(k) > 1]
-    far = np.flatnonzero((off > OUTLYING * np.max(near, axis=0)) & (off > OUTSIDE * deviation))
-    if not len(far):
+    interpolated = (values[:-2] * steps[1:] + values[2:] * steps[:-1]) / (steps[1:] + steps[:-1])
+    gaps = np.abs(values[1:-1] - interpolated)
+    padded = np.pad(gaps, NEIGHBORS)
+    nearby = [padded[NEIGHBORS + k : len(gaps) + NEIGHBORS + k] for k in range(-NEIGHBORS, NEIGHBORS + 1) if abs(k) > 1]
+    outliers = np.flatnonzero((gaps > OUTLYING * np.max(nearby, axis=0)) & (gaps > OUTSIDE * deviation))
+    if not len(outliers):
         return ""
-    first = int(far[0]) + 1
-    count = f"; {len(far)} samples are such" if len(far) > 1 else ""
+    first = int(outliers[0]) + 1
+    count = f"; {len(outliers)} samples are such" if len(outliers) > 1 else ""
     return (
-        f"the sample at t = {time_text(times[first])} s is {off[first - 1]:.3g} from those beside it{count}: "
+        f"the sample at t = {time_text(times[first])} s is {gaps[first - 1]:.3g} from those beside it{count}: "
         "the motion goes there and back, within the deviation; leave out what is an outlier"
     )
 
@@ -237,8 +237,8 @@ def sampled(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float[np
     if of_samples and law.samples.value is not None:
         return law.samples.value
     if isinstance(law, HermiteMotion) and law.degree == 1 and law.beyond == "refuse":
-        last = float(law.stop)
-        times = np.append(np.asarray(law.breakpoints, float)[:-1], last)
+        stop = float(law.stop)
+        times = np.append(np.asarray(law.breakpoints, float)[:-1], stop)
         return times, np.asarray(law.coefficients, float)[0]
     return None
 
@@ -258,21 +258,21 @@ def smoothed_samples(
         raise TrajectoryError(message, value=len(times))
     sigma = noise_of(times, values)
     if not np.ptp(values):
-        still = [Dwell(0, len(times) - 1, float(values[0]))]
+        rests = [Dwell(0, len(times) - 1, float(values[0]))]
         estimates = [IntervalEstimate(float(times[0]), float(times[-1]), 1.0, 1.0, 0.0)]
     else:
-        still, estimates = _dwells_and_estimates(times, values, sigma)
-        still = [_fitting(times, values, dwell, deviation) for dwell in still]
-    curve = smoothed_curve(times, values, deviation, estimates, still)
+        rests, estimates = _dwells_and_estimates(times, values, sigma)
+        rests = [_fitting(times, values, dwell, deviation) for dwell in rests]
+    curve = smoothed_curve(times, values, deviation, estimates, rests)
     from scipy.interpolate import BSpline  # importing SciPy takes half a second
 
     spline = BSpline(whole(curve.knots), curve.coefficients, DEGREE)
     powers = local_powers(spline, curve.knots[:-1], DEGREE)
-    for dwell in still:  # exactly at rest, not only to rounding
-        own = (curve.knots[:-1] >= times[dwell.first]) & (curve.knots[:-1] < times[dwell.last])
-        powers[0, own], powers[1:, own] = dwell.position, 0.0
+    for dwell in rests:  # exactly at rest, not only to rounding
+        is_resting = (curve.knots[:-1] >= times[dwell.first]) & (curve.knots[:-1] < times[dwell.last])
+        powers[0, is_resting], powers[1:, is_resting] = dwell.position, 0.0
     law = SmoothPieces(curve.knots[:-1], powers, float(curve.knots[-1]))
-    intervals = tuple((float(times[d.first]), float(times[d.last])) for d in still)
+    intervals = tuple((float(times[d.first]), float(times[d.last])) for d in rests)
     rates = [estimate.cutoff / (2 * np.pi) for estimate in estimates]
     noise = max(sigma, float(np.median([estimate.noise for estimate in estimates])))
     return law, SmoothedJoint(noise, curve.away, intervals, (min(rates), max(rates)))
@@ -286,24 +286,24 @@ def _dwells_and_estimates(
     A dwell no longer than its margins is a slow part of a motion, and is dropped.
     """
     whole_dwells = dwells(times, values, sigma)
-    known: dict[tuple[int, int], list[IntervalEstimate]] = {}
+    cached: dict[tuple[int, int], list[IntervalEstimate]] = {}
     while True:
-        estimates = _moving(times, values, whole_dwells, known)
+        estimates = _moving(times, values, whole_dwells, cached)
         scales = [_scales(times, dwell, estimates) for dwell in whole_dwells]
         inner = [without_margins([d], times, [scale]) for d, scale in zip(whole_dwells, scales, strict=True)]
         if all(inner):
             return [dwell for (dwell,) in inner], estimates
-        whole_dwells = [dwell for dwell, rest in zip(whole_dwells, inner, strict=True) if rest]
+        whole_dwells = [dwell for dwell, margins in zip(whole_dwells, inner, strict=True) if margins]
 
 
 def _fitting(times: np.ndarray, values: np.ndarray, dwell: Dwell, deviation: float) -> Dwell:
     """Return a dwell at a position within the deviation of all its samples."""
-    own = values[dwell.first : dwell.last + 1]
-    low, high = float(own.max()) - deviation, float(own.min()) + deviation
+    block = values[dwell.first : dwell.last + 1]
+    low, high = float(block.max()) - deviation, float(block.min()) + deviation
     if low > high:
-        at = int(dwell.first + np.argmax(np.abs(own - np.median(own))))
+        k = int(dwell.first + np.argmax(np.abs(block - np.median(block))))
         message = (
-            f"samples of a dwell differ by {np.ptp(own):.3g} about t = {time_text(times[at])} s, more than twice the "
+            f"samples of a dwell differ by {np.ptp(block):.3g} about t = {time_text(times[k])} s, more than twice the "
             f"deviation of {deviation:.3g}; choose a larger one"
         )
         raise TrajectoryError(message)
@@ -319,16 +319,16 @@ def _scales(times: np.ndarray, dwell: Dwell, estimates: list[IntervalEstimate]) 
 
 
 def _moving(
-    times: np.ndarray, values: np.ndarray, still: list[Dwell], known: dict[tuple[int, int], list[IntervalEstimate]]
+    times: np.ndarray, values: np.ndarray, rests: list[Dwell], cached: dict[tuple[int, int], list[IntervalEstimate]]
 ) -> list[IntervalEstimate]:
-    """Return the estimates of intervals between dwells, and store them in `known` by their first and last sample."""
-    edges = [0, *(k for dwell in still for k in (dwell.first, dwell.last)), len(times) - 1]
+    """Return the estimates of intervals between dwells, and store them in `cached` by their first and last sample."""
+    edges = [0, *(k for dwell in rests for k in (dwell.first, dwell.last)), len(times) - 1]
     estimates: list[IntervalEstimate] = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         if last - first >= FEWEST:
-            if (first, last) not in known:
-                known[first, last] = interval_estimates(times[first : last + 1], values[first : last + 1])
-            estimates += known[first, last]
+            if (first, last) not in cached:
+                cached[first, last] = interval_estimates(times[first : last + 1], values[first : last + 1])
+            estimates += cached[first, last]
     if not estimates:
         estimates = interval_estimates(times, values)
     return sorted(estimates, key=lambda estimate: estimate.start)

@@ -60,24 +60,24 @@ def interval_estimates(
     estimates = []
     while pending:
         first, last = pending.pop()
-        own, resolved = _resolved(times[first:last], values[first:last])
+        candidate, resolved = _resolved(times[first:last], values[first:last])
         if not resolved and last - first >= 2 * LEAST:
             middle = (first + last) // 2
             pending += [(first, middle), (middle, last)]
         else:
-            estimates.append(own)
+            estimates.append(candidate)
     return sorted(estimates, key=lambda estimate: estimate.start)
 
 
 def _resolved(times: np.ndarray, values: np.ndarray) -> tuple[IntervalEstimate, bool]:
     """Return the estimate with the fewest cells that resolve the cutoff frequency, and whether any do."""
     counts = [min(cells, len(times) - 1) for cells in CELLS]
-    own = _estimate(times, values, counts[0])
+    estimate = _estimate(times, values, counts[0])
     for k, cells in enumerate(counts):
-        own = _estimate(times, values, cells) if k else own
-        if own.cutoff * (own.stop - own.start) <= RESOLVED * cells:
-            return own, True
-    return own, False
+        estimate = _estimate(times, values, cells) if k else estimate
+        if estimate.cutoff * (estimate.stop - estimate.start) <= RESOLVED * cells:
+            return estimate, True
+    return estimate, False
 
 
 def _estimate(times: np.ndarray, values: np.ndarray, cells: int) -> IntervalEstimate:
@@ -87,37 +87,37 @@ def _estimate(times: np.ndarray, values: np.ndarray, cells: int) -> IntervalEsti
     offset = _without_cubic(times, values)
     floor = max(float(np.abs(values).max()) * np.finfo(float).eps, FLOOR * float(np.ptp(values)))
     least_cost = _least_cost(matrix, offset, count * floor**2, cells)
-    free = cells + DEGREE - PENALIZED
+    freedom = cells + DEGREE - PENALIZED
 
     def unlikely(logarithms: Float[np.ndarray, " weight"]) -> Float[np.ndarray, " weight"]:
-        rest, determinant = least_cost(np.exp(logarithms))
-        return (count - PENALIZED) * np.log(rest) + determinant - free * logarithms
+        residual, determinant = least_cost(np.exp(logarithms))
+        return (count - PENALIZED) * np.log(residual) + determinant - freedom * logarithms
 
     grid = np.linspace(*RANGE, STEPS)
     costs = unlikely(grid)
-    best = int(np.argmin(costs))
+    index = int(np.argmin(costs))
     for _ in range(REFINED):
-        grid = np.linspace(grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)], FINE)
+        grid = np.linspace(grid[max(index - 1, 0)], grid[min(index + 1, len(grid) - 1)], FINE)
         costs = unlikely(grid)
-        best = int(np.argmin(costs))
-    logarithm = float(grid[best])
-    if 0 < best < FINE - 1 and np.isfinite(costs[best - 1 : best + 2]).all():
-        before, at, after = costs[best - 1 : best + 2]
+        index = int(np.argmin(costs))
+    logarithm = float(grid[index])
+    if 0 < index < FINE - 1 and np.isfinite(costs[index - 1 : index + 2]).all():
+        before, at, after = costs[index - 1 : index + 2]
         bend = before - 2 * at + after
         logarithm += float((grid[1] - grid[0]) * (before - after) / (2 * bend)) if bend > 0 else 0.0
-    rest = float(least_cost(np.exp(np.array([logarithm])))[0][0])
+    residual = float(least_cost(np.exp(np.array([logarithm])))[0][0])
     cell = span / cells
     weight = float(np.exp(logarithm)) * cell ** (2 * PENALIZED - 1)
     cutoff = float((count / span / weight) ** (1 / (2 * PENALIZED)))
     return IntervalEstimate(
-        float(times[0]), float(times[-1]), weight, cutoff, float(np.sqrt(rest / (count - PENALIZED)))
+        float(times[0]), float(times[-1]), weight, cutoff, float(np.sqrt(residual / (count - PENALIZED)))
     )
 
 
 def _without_cubic(times: np.ndarray, values: np.ndarray) -> Float[np.ndarray, " sample"]:
     """Return samples minus their least-squares cubic, which has no jounce."""
-    since = np.clip((times - times[0]) * (2 / (times[-1] - times[0])) - 1, -1.0, 1.0)
-    powers = np.polynomial.legendre.legvander(since, PENALIZED - 1)
+    scaled_times = np.clip((times - times[0]) * (2 / (times[-1] - times[0])) - 1, -1.0, 1.0)
+    powers = np.polynomial.legendre.legvander(scaled_times, PENALIZED - 1)
     return values - powers @ np.linalg.lstsq(powers.T @ powers, powers.T @ values)[0]
 
 
@@ -148,30 +148,30 @@ def _least_cost(
     base, slope = np.zeros((2, len(root.T) + 1, len(root.T) + 1))
     base[:-1, :-1] = (matrix.T @ matrix).toarray()
     slope[:-1, :-1] = root.T @ root
-    near = np.zeros(len(root.T))
+    fit = np.zeros(len(root.T))
     for weight in np.exp(np.linspace(*RANGE, STEPS)):  # the first succeeds, unless cells have no samples
         try:
             factor = np.linalg.cholesky(base[:-1, :-1] + weight * slope[:-1, :-1])
         except np.linalg.LinAlgError:
             continue
-        near = cho_solve((factor, True), matrix.T @ offset)
+        fit = cho_solve((factor, True), matrix.T @ offset)
         break
-    residual, bent = offset - matrix @ near, root @ near
-    far, far_slope = base.copy(), slope.copy()
-    for own, rest in ((base, residual), (far, offset)):
-        own[:-1, -1] = own[-1, :-1] = matrix.T @ rest
-        own[-1, -1] = rest @ rest + floor
+    residual, bent = offset - matrix @ fit, root @ fit
+    zero_based, zero_slope = base.copy(), slope.copy()
+    for system, residuals in ((base, residual), (zero_based, offset)):
+        system[:-1, -1] = system[-1, :-1] = matrix.T @ residuals
+        system[-1, -1] = residuals @ residuals + floor
     slope[:-1, -1] = slope[-1, :-1] = -(root.T @ bent)
     slope[-1, -1] = bent @ bent
 
-    def least(weights: Float[np.ndarray, " weight"]) -> tuple[np.ndarray, np.ndarray]:
-        stiff = base[-1, -1] + weights * slope[-1, -1] > far[-1, -1]
-        systems = np.where(stiff[:, None, None], far, base)
-        systems += weights[:, None, None] * np.where(stiff[:, None, None], far_slope, slope)
+    def least_costs(weights: Float[np.ndarray, " weight"]) -> tuple[np.ndarray, np.ndarray]:
+        stiff = base[-1, -1] + weights * slope[-1, -1] > zero_based[-1, -1]
+        systems = np.where(stiff[:, None, None], zero_based, base)
+        systems += weights[:, None, None] * np.where(stiff[:, None, None], zero_slope, slope)
         pivots = _pivots(systems)
         return pivots[:, -1] ** 2, 2 * np.log(pivots[:, :-1]).sum(axis=1)
 
-    return least
+    return least_costs
 
 
 def _pivots(systems: Float[np.ndarray, "weight row row"]) -> Float[np.ndarray, "weight row"]:

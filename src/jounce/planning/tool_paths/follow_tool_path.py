@@ -116,8 +116,8 @@ def follow_tool_path(
     ranges, followers = joint_ranges(robot), SharedFollowers.of(robot)
     laws = _fixed_joint_laws(robot, hold, path)
     fixed_joints = tuple(robot.joint_names.index(name) for name in laws.names) if laws else ()
-    given = _numbers(robot, "posture", posture)
-    rest = middle(*ranges) if given is None else given
+    values = _numbers(robot, "posture", posture)
+    rest_posture = middle(*ranges) if values is None else values
     weight = _numbers(robot, "weights", weights)
     weight = np.ones(n) if weight is None else weight
     if (weight <= 0).any():
@@ -127,9 +127,9 @@ def follow_tool_path(
     if fixed_joints:
         units = np.broadcast_to(np.eye(n)[list(fixed_joints)], (len(columns), len(fixed_joints), n))
         columns = np.concatenate([columns, units], axis=1)
-    basis, whole = reachable_rows(columns)
+    basis, rank = reachable_rows(columns)
     equations = PathEquations(robot.tree, tool, basis, scale, weight, fixed_joints, kinds, n)
-    if whole < min(basis.shape[1], n):
+    if rank < min(basis.shape[1], n):
         message = "the held joints and the tool do not determine the other joints; hold others, or fewer"
         raise RobotError(message, name="hold", value=list(laws.names) if laws else None)
 
@@ -140,17 +140,17 @@ def follow_tool_path(
             goal["held"] = _coefficients(jet) / scale[list(fixed_joints)][:, None]
         if equations.has_posture:
             states = np.zeros((levels + 1, n, len(instants)))
-            states[0] = (rest / scale)[:, None]
+            states[0] = (rest_posture / scale)[:, None]
             goal["posture"] = states
         return goal
 
     ends = tuple(np.concatenate(x) for x in zip(ranges, followers.ranges, strict=True)) if limits else None
-    begin = _start(robot, tool, path, ends, laws, start, scale, kinds, link)
-    u = np.concatenate([begin / scale, np.zeros(equations.size - n)])
+    start_q = _start(robot, tool, path, ends, laws, start, scale, kinds, link)
+    u = np.concatenate([start_q / scale, np.zeros(equations.size - n)])
     if equations.has_posture:
         u = _to_posture(equations, u, target, path.start, link)
     nodes = followed(equations, u, target, path.start, path.stop, path.highest)
-    motion = ToolPathMotion(robot, link, path, equations, nodes, target, whole, ends, time, order)
+    motion = ToolPathMotion(robot, link, path, equations, nodes, target, rank, ends, time, order)
     if strict:
         _raise_for(motion, nodes)
     return motion
@@ -166,12 +166,12 @@ def _start(
         for name, value in zip(laws.names, laws.derivatives([path.start], 0)[0, 0], strict=True):
             k = robot.joint_names.index(name)
             lower[k] = upper[k] = value
-    near = _numbers(robot, "start", start)
+    given_start = _numbers(robot, "start", start)
     goal = {kind: np.moveaxis(x[0], -1, 0) for kind, x in path.series(np.array([path.start]), 0).items()}
-    guess = middle(*joint_ranges(robot)) if near is None else near
-    goals, starts = {kind: goal[kind] for kind in kinds}, 8 if near is None else 1
-    shared = follower_ranges(robot, tool, limits=ranges is not None)
-    result = poses_within(robot, tool, goals, (lower, upper, scale), shared, guess[None], starts)
+    guess = middle(*joint_ranges(robot)) if given_start is None else given_start
+    goals, starts = {kind: goal[kind] for kind in kinds}, 8 if given_start is None else 1
+    followers = follower_ranges(robot, tool, limits=ranges is not None)
+    result = poses_within(robot, tool, goals, (lower, upper, scale), followers, guess[None], starts)
     if not result[1][0] <= REACHED**2:
         missed = float(np.sqrt(result[1][0]))
         message = (
@@ -182,22 +182,22 @@ def _start(
     return result[0][0]
 
 
-def _to_posture(equations: PathEquations, u: np.ndarray, target: Any, begin: float, link: str) -> np.ndarray:
+def _to_posture(equations: PathEquations, u: np.ndarray, target: Any, instant: float, link: str) -> np.ndarray:
     """Return the unknowns nearest to a posture, by continuation from given unknowns as the posture moves."""
-    first = target(np.array([begin]), 0)
-    own, posture = u[: equations.count], first["posture"][0, :, 0]
+    first = target(np.array([instant]), 0)
+    coordinates, posture = u[: equations.count], first["posture"][0, :, 0]
 
-    def moving(shares: np.ndarray, levels: int) -> dict[str, Any]:
+    def moving_target(shares: np.ndarray, levels: int) -> dict[str, Any]:
         goal = {}
         for kind, values in first.items():
             goal[kind] = np.zeros((levels + 1, *values.shape[1:-1], len(shares)))
             goal[kind][0] = values[0]
-        goal["posture"][0] = own[:, None] + (posture - own)[:, None] * shares
+        goal["posture"][0] = coordinates[:, None] + (posture - coordinates)[:, None] * shares
         if levels:
-            goal["posture"][1] = (posture - own)[:, None]
+            goal["posture"][1] = (posture - coordinates)[:, None]
         return goal
 
-    nodes = followed(equations, u, moving, 0.0, 1.0, 30)
+    nodes = followed(equations, u, moving_target, 0.0, 1.0, 30)
     if nodes.failed is not None:
         message = (
             "the coordinates nearest to the posture are not reached from the start: on the way, these "
@@ -208,13 +208,13 @@ def _to_posture(equations: PathEquations, u: np.ndarray, target: Any, begin: flo
 
 
 def _raise_for(motion: ToolPathMotion, nodes: Nodes) -> None:
-    bad = np.flatnonzero(motion.status != Status.OK)
-    if nodes.failed is None and not bad.size:
+    failures = np.flatnonzero(motion.status != Status.OK)
+    if nodes.failed is None and not failures.size:
         return
-    words = motion.explain(int(bad[0])) if bad.size else motion.ending
-    status = int(motion.status[bad[0]]) if bad.size else int(Status.SINGULAR)
+    reason = motion.explain(int(failures[0])) if failures.size else motion.ending
+    status = int(motion.status[failures[0]]) if failures.size else int(Status.SINGULAR)
     error: type[JounceError] = SingularityError if status in (Status.SINGULAR, Status.NOT_REACHED) else RobotError
-    raise error(words, name=motion.link)
+    raise error(reason, name=motion.link)
 
 
 def _fixed_joint_laws(robot: Robot, hold: Any, path: ToolPath) -> JointTrajectory | None:

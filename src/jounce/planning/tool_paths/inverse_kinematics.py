@@ -112,30 +112,30 @@ def inverse_kinematics(
     tool = tool_of(robot, link, point, axis)
     goal, lead = _checked_goal(position, orientation, direction)
     lower, upper = joint_ranges(robot) if limits else (np.full(len(robot.joint_names), x) for x in (-np.inf, np.inf))
-    begin = middle(lower, upper) if start is None else np.asarray(checked_position(robot, start, "start"))[..., 0, :]
-    if not np.isfinite(begin).all():
+    guess = middle(lower, upper) if start is None else np.asarray(checked_position(robot, start, "start"))[..., 0, :]
+    if not np.isfinite(guess).all():
         raise RobotError("must be finite", name="start")
     starts, most_steps = whole_number("starts", starts, 1), whole_number("most_steps", most_steps, 1)
-    within = float(floats("tolerance", tolerance)) if np.ndim(tolerance) == 0 else np.nan
-    if not within > 0:
+    bound = float(floats("tolerance", tolerance)) if np.ndim(tolerance) == 0 else np.nan
+    if not bound > 0:
         raise RobotError("must be greater than zero", name="tolerance", value=tolerance)
     try:
-        lead = np.broadcast_shapes(lead, begin.shape[:-1])
+        lead = np.broadcast_shapes(lead, guess.shape[:-1])
     except ValueError:
-        message = f"does not fit the poses, of shape {lead}: its shape is {begin.shape}"
+        message = f"does not fit the poses, of shape {lead}: its shape is {guess.shape}"
         raise RobotError(message, name="start") from None
     scale = coordinate_scale(robot, tool)
     count, n = int(np.prod(lead)), len(lower)
     if not count:
         raise RobotError("there is no pose to reach; give at least one", value=f"shape {lead}")
-    begin = np.broadcast_to(begin, (*lead, n)).reshape(count, n)
+    guess = np.broadcast_to(guess, (*lead, n)).reshape(count, n)
     goal = {kind: np.broadcast_to(x, (*lead, *WIDTHS[kind])).reshape(count, *WIDTHS[kind]) for kind, x in goal.items()}
-    shared = follower_ranges(robot, tool, limits)
-    result = poses_within(robot, tool, goal, (lower, upper, scale), shared, begin, starts, within, most_steps, seed)
+    followers = follower_ranges(robot, tool, limits)
+    result = poses_within(robot, tool, goal, (lower, upper, scale), followers, guess, starts, bound, most_steps, seed)
     anywhere = random_coordinates(lower, upper, scale, CONFIGURATIONS, seed)
     basis = task_columns(robot, tool, anywhere, tuple(goal), scale)
     return _result(
-        robot, link, point, result, goal, lead, within, (lower, upper, scale), shared, reachable_rows(basis)[1], tool
+        robot, link, point, result, goal, lead, bound, (lower, upper, scale), followers, reachable_rows(basis)[1], tool
     )
 
 
@@ -144,47 +144,47 @@ def poses_within(
     tool: Tool,
     goal: dict[str, Any],
     ranges: tuple[Any, Any, Any],
-    shared: FollowerRanges,
-    begin: Float[np.ndarray, "count n"],
+    followers: FollowerRanges,
+    guess: Float[np.ndarray, "count n"],
     starts: int = 8,
-    within: float = 1e-10,
+    bound: float = 1e-10,
     most_steps: int = 200,
     seed: int = 0,
 ) -> list[np.ndarray]:
     """Return the results of `solve_poses` within ranges of the coordinates, from the first start or further starts."""
     lower, upper, scale = ranges
-    constants = (tool, lower / scale, upper / scale, scale, shared, np.float64(within * FINER))
+    constants = (tool, lower / scale, upper / scale, scale, followers, np.float64(bound * FINER))
 
-    def solved(begin: np.ndarray, chosen: Any) -> list[np.ndarray]:
+    def solutions(guess: np.ndarray, chosen: Any) -> list[np.ndarray]:
         targets = [x[chosen] for x in goal.values()]
-        result = _marched(robot, begin, targets, constants, tuple(goal), min(most_steps, SOON))
+        result = _marched(robot, guess, targets, constants, tuple(goal), min(most_steps, SOON))
         steps, slow = SOON, np.flatnonzero(result[3] > 0)
         while slow.size and steps < most_steps:  # fewer and fewer poses continue
-            left = min(steps, most_steps - steps)
-            more = _marched(robot, result[0][slow], [x[slow] for x in targets], constants, tuple(goal), left)
-            for whole, part in zip(result, more, strict=True):
-                whole[slow] = part
-            steps, slow = steps + left, slow[more[3] > 0]
+            steps_left = min(steps, most_steps - steps)
+            continued = _marched(robot, result[0][slow], [x[slow] for x in targets], constants, tuple(goal), steps_left)
+            for array, chunk in zip(result, continued, strict=True):
+                array[slow] = chunk
+            steps, slow = steps + steps_left, slow[continued[3] > 0]
         return result
 
-    result = solved(begin, slice(None))
-    failed = np.flatnonzero(~(result[1] <= within**2))
-    if failed.size and starts > 1:
-        others = random_coordinates(lower, upper, scale, (starts - 1) * len(failed), seed)
-        again = solved(others, np.repeat(failed, starts - 1))
-        tried = [x.reshape(len(failed), starts - 1, *x.shape[1:]) for x in again]
-        away = (np.abs(tried[0] - begin[failed][:, None]) / scale).max(axis=-1)
-        good = tried[1] <= within**2
-        best = np.where(good.any(1), np.argmin(np.where(good, away, np.inf), 1), np.argmin(tried[1], 1))
-        rows = np.arange(len(failed))
-        nearer = tried[1][rows, best] < result[1][failed]
-        for whole, part in zip(result, tried, strict=True):
-            whole[failed[nearer]] = part[rows, best][nearer]
+    result = solutions(guess, slice(None))
+    failures = np.flatnonzero(~(result[1] <= bound**2))
+    if failures.size and starts > 1:
+        guesses = random_coordinates(lower, upper, scale, (starts - 1) * len(failures), seed)
+        retries = solutions(guesses, np.repeat(failures, starts - 1))
+        trials = [x.reshape(len(failures), starts - 1, *x.shape[1:]) for x in retries]
+        distance = (np.abs(trials[0] - guess[failures][:, None]) / scale).max(axis=-1)
+        valid = trials[1] <= bound**2
+        choice = np.where(valid.any(1), np.argmin(np.where(valid, distance, np.inf), 1), np.argmin(trials[1], 1))
+        rows = np.arange(len(failures))
+        nearer = trials[1][rows, choice] < result[1][failures]
+        for array, chunk in zip(result, trials, strict=True):
+            array[failures[nearer]] = chunk[rows, choice][nearer]
     return result
 
 
-def _marched(robot: Robot, begin: Any, targets: Any, constants: Any, kinds: tuple[str, ...], steps: int) -> list[Any]:
-    arrays = (begin[:, None], *(x[:, None] for x in targets))
+def _marched(robot: Robot, guess: Any, targets: Any, constants: Any, kinds: tuple[str, ...], steps: int) -> list[Any]:
+    arrays = (guess[:, None], *(x[:, None] for x in targets))
     return [np.asarray(x)[:, 0] for x in solve_poses(robot, arrays, (*constants, np.int64(steps)), (kinds,))]
 
 
@@ -195,30 +195,30 @@ def _result(
     solved: Any,
     goal: Any,
     lead: Any,
-    within: float,
+    bound: float,
     ranges: Any,
-    shared: FollowerRanges,
+    followers: FollowerRanges,
     rank: int,
     tool: Tool,
 ) -> JointPoses:
     q, square, level, _, values, shares = solved
     lower, upper, scale = ranges
     status = np.where(level <= STATIONARY, int(Status.NOT_ASSEMBLED), int(Status.NOT_CONVERGED))
-    status = np.where(square <= within**2, int(Status.OK), status)
+    status = np.where(square <= bound**2, int(Status.OK), status)
     distance, angle = _away(robot, link, point, q, goal, tool)
     values, shares = values[:, :rank], shares[:, max(rank - 1, 0)]
     singular = values[:, -1] <= SINGULAR * values[:, 0] if rank else np.ones(len(q), bool)
     x = q / scale
-    place = x @ shared.weights.T + shared.offset
+    place = x @ followers.weights.T + followers.offset
     limited = np.concatenate(
-        [_at_ends(x, lower / scale, upper / scale), _at_ends(place, shared.lower, shared.upper)], 1
+        [_at_ends(x, lower / scale, upper / scale), _at_ends(place, followers.lower, followers.upper)], 1
     )
-    given = np.where((status == Status.OK)[:, None], q, np.nan)
-    parts = (given, status, q, distance, angle, singular, values, shares)
-    shaped = [x.reshape((*lead, *x.shape[1:])) for x in parts]
+    q_reached = np.where((status == Status.OK)[:, None], q, np.nan)
+    arrays = (q_reached, status, q, distance, angle, singular, values, shares)
+    shaped = [x.reshape((*lead, *x.shape[1:])) for x in arrays]
     names = ("q", "status", "closest", "distance", "angle", "singular", "singular_values", "shares")
     solved = dict(zip(names, shaped, strict=True))
-    limited_names = (*robot.joint_names, *(SharedFollowers.of(robot).names if len(shared.offset) else ()))
+    limited_names = (*robot.joint_names, *(SharedFollowers.of(robot).names if len(followers.offset) else ()))
     limited = limited.reshape((*lead, len(limited_names)))
     return JointPoses(**solved, joint_names=robot.joint_names, limited=limited, limited_names=limited_names)
 
@@ -230,13 +230,13 @@ def _at_ends(x: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
 def _away(robot: Robot, link: str, point: Any, q: Any, goal: Any, tool: Tool) -> tuple[Any, Any]:
     """Return the position errors of tools, m, and their orientation errors, rad."""
     motion = forward_kinematics(robot, q[:, None], link, point)
-    there, turned = np.asarray(motion.position)[:, 0], np.asarray(motion.rotation)[:, 0]
-    distance = np.linalg.norm(there - goal["position"], axis=-1) if "position" in goal else np.zeros(len(q))
+    position, rotation = np.asarray(motion.position)[:, 0], np.asarray(motion.rotation)[:, 0]
+    distance = np.linalg.norm(position - goal["position"], axis=-1) if "position" in goal else np.zeros(len(q))
     chord = np.zeros(len(q))
     if "rotation" in goal:
-        chord = np.linalg.norm(turned - goal["rotation"], axis=(1, 2)) / np.sqrt(2.0)
+        chord = np.linalg.norm(rotation - goal["rotation"], axis=(1, 2)) / np.sqrt(2.0)
     if "direction" in goal:
-        chord = np.linalg.norm(turned @ tool.axes[:, 2] - goal["direction"], axis=-1)
+        chord = np.linalg.norm(rotation @ tool.axes[:, 2] - goal["direction"], axis=-1)
     return distance, 2 * np.arcsin(np.minimum(0.5 * chord, 1.0))
 
 
@@ -268,29 +268,29 @@ def _checked_goal(position: Any, orientation: Any, direction: Any) -> tuple[dict
 def follower_ranges(robot: Robot, tool: Tool, limits: bool = True) -> FollowerRanges:
     """Return the ranges of joints that follow several, in scaled coordinates; of none without `limits`."""
     followers = SharedFollowers.of(robot)
-    turning = np.array([joint.turning for joint in followers.joints], bool)
-    own, (lower, upper) = np.where(turning, 1.0, float(tool.length)), followers.ranges
-    weights = followers.weights * coordinate_scale(robot, tool) / own[:, None]
-    ranges = FollowerRanges(weights, followers.offset / own, lower / own, upper / own)
+    turns = np.array([joint.turning for joint in followers.joints], bool)
+    scale, (lower, upper) = np.where(turns, 1.0, float(tool.length)), followers.ranges
+    weights = followers.weights * coordinate_scale(robot, tool) / scale[:, None]
+    ranges = FollowerRanges(weights, followers.offset / scale, lower / scale, upper / scale)
     return ranges if limits else FollowerRanges(*(x[:0] for x in ranges))
 
 
 def joint_ranges(robot: AbstractRobot) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Return the ranges of the coordinates, infinite without limits."""
     limits = robot.limits.values()
-    lower = np.array([-np.inf if own.lower is None else own.lower for own in limits], float)
-    upper = np.array([np.inf if own.upper is None else own.upper for own in limits], float)
+    lower = np.array([-np.inf if limit.lower is None else limit.lower for limit in limits], float)
+    upper = np.array([np.inf if limit.upper is None else limit.upper for limit in limits], float)
     return lower, upper
 
 
 def middle(lower: np.ndarray, upper: np.ndarray) -> Float[np.ndarray, " n"]:
     """Return the middle of ranges; for an unbounded range zero, or the end nearest to zero."""
-    known = np.isfinite(lower) & np.isfinite(upper)
-    ends = np.where(known, (lower, upper), 0.0)
-    return np.where(known, 0.5 * ends[0] + 0.5 * ends[1], np.clip(0.0, lower, upper))
+    is_bounded = np.isfinite(lower) & np.isfinite(upper)
+    ends = np.where(is_bounded, (lower, upper), 0.0)
+    return np.where(is_bounded, 0.5 * ends[0] + 0.5 * ends[1], np.clip(0.0, lower, upper))
 
 
 def coordinate_scale(robot: AbstractRobot, tool: Tool) -> Float[np.ndarray, " n"]:
     """Return the unit of each coordinate: 1 rad, or the size of the robot."""
-    turning = np.array([robot.joints[name].turning for name in robot.joint_names])
-    return np.where(turning, 1.0, float(tool.length))
+    turns = np.array([robot.joints[name].turning for name in robot.joint_names])
+    return np.where(turns, 1.0, float(tool.length))

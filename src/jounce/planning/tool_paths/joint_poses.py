@@ -55,8 +55,8 @@ class JointPoses(Displayed):
     limited_names: tuple[str, ...]
 
     def __repr__(self) -> str:
-        solved = int((self.status == Status.OK).sum())
-        return f"<JointPoses: {solved} of {self.status.size} poses, {int(self.singular.sum())} singular>"
+        count = int((self.status == Status.OK).sum())
+        return f"<JointPoses: {count} of {self.status.size} poses, {int(self.singular.sum())} singular>"
 
     def explain(self, *index: int) -> str:
         """Return the result for a pose in words: the remaining error and its cause, and the joints that lose a motion.
@@ -67,23 +67,23 @@ class JointPoses(Displayed):
             Index of the pose in the batch; none for a single pose.
         """
         lane: Any = index
-        words = []
+        phrases = []
         if self.status[lane] == Status.OK:
-            words.append("reached")
+            phrases.append("reached")
         else:
             gap = f"the nearest found is {self.distance[lane]:.3g} m and {self.angle[lane]:.3g} rad away"
             if self.status[lane] == Status.NOT_CONVERGED:
-                words.append(f"not converged: {gap}; allow more steps, or give another start")
+                phrases.append(f"not converged: {gap}; allow more steps, or give another start")
             else:
-                words.append(f"not reached: {gap}, and nothing near it is nearer; move the pose, or try more starts")
-            limiting = [name for name, at in zip(self.limited_names, self.limited[lane], strict=True) if at]
+                phrases.append(f"not reached: {gap}, and nothing near it is nearer; move the pose, or try more starts")
+            limiting = [name for name, flag in zip(self.limited_names, self.limited[lane], strict=True) if flag]
             if limiting:
-                words.append(f"at their limits: {', '.join(limiting)}")
+                phrases.append(f"at their limits: {', '.join(limiting)}")
         if self.singular[lane]:
-            lost = ", ".join(losing_joints(self.joint_names, self.shares[lane]))
-            least, largest = self.singular_values[lane][-1], self.singular_values[lane][0]
-            words.append(
-                f"singular: the motions of {lost} cancel at the tool (singular values from {largest:.2g} down to "
-                f"{least:.2g})"
+            names = ", ".join(losing_joints(self.joint_names, self.shares[lane]))
+            smallest, largest = self.singular_values[lane][-1], self.singular_values[lane][0]
+            phrases.append(
+                f"singular: the motions of {names} cancel at the tool (singular values from {largest:.2g} down to "
+                f"{smallest:.2g})"
             )
-        return "; ".join(words)
+        return "; ".join(phrases)

@@ -82,8 +82,8 @@ class PathEquations(Module):
         if not self.has_posture:
             return self.task(x, target)
         # coefficients of J^T l are a convolution: the transposed map applied to l in reverse order
-        rows, back = jax.vjp(lambda x: self.task(x, target), x)
-        balance = back(multipliers[::-1])[0][::-1]
+        rows, transposed = jax.vjp(lambda x: self.task(x, target), x)
+        balance = transposed(multipliers[::-1])[0][::-1]
         pull = jnp.asarray(self.weights)[None, :, None] * (x - target["posture"])
         return jnp.concatenate([rows, pull + balance], axis=1)
 
@@ -104,16 +104,16 @@ class PathEquations(Module):
             factor = PathFactor.of(self.matrix(x.u, first))
             step = -factor.solve(self.residual(x.u[None], first)[0])
             size = jnp.max(jnp.abs(step), axis=0)
-            begun = jnp.where(count > 0, x.first, size)
-            return Corrected(x.u + step, factor, begun, size), x.last, count + 1
+            first_size = jnp.where(count > 0, x.first, size)
+            return Corrected(x.u + step, factor, first_size, size), x.last, count + 1
 
-        def open_(carry: tuple[Corrected, Any, Any]) -> Any:
+        def is_open(carry: tuple[Corrected, Any, Any]) -> Any:
             return ~(jnp.all(carry[1] <= CLOSE)) & (carry[2] < MOST)
 
-        far, rows = jnp.full(u.shape[1:], jnp.inf), self.rows + (self.count if self.has_posture else 0)
+        infinite, rows = jnp.full(u.shape[1:], jnp.inf), self.rows + (self.count if self.has_posture else 0)
         blank = PathFactor(jnp.zeros((rows, *u.shape)), jnp.zeros((len(u), rows, u.shape[1])))
-        start = Corrected(u, blank, far, far), far, jnp.zeros((), int)
-        return jax.lax.while_loop(open_, correct, start)[0]
+        start = Corrected(u, blank, infinite, infinite), infinite, jnp.zeros((), int)
+        return jax.lax.while_loop(is_open, correct, start)[0]
 
     def series(
         self, u: Float[Numbers, "unknown batch"], factor: "PathFactor", target: dict[str, Any], order: int
@@ -121,8 +121,8 @@ class PathEquations(Module):
         """Return the series of the unknowns, order by order, with one factorization."""
 
         def level(k: Any, series: Any) -> Any:
-            missing = jax.lax.dynamic_index_in_dim(self.residual(series, target), k, 0, keepdims=False)
-            return jax.lax.dynamic_update_index_in_dim(series, -factor.solve(missing), k, 0)
+            gap = jax.lax.dynamic_index_in_dim(self.residual(series, target), k, 0, keepdims=False)
+            return jax.lax.dynamic_update_index_in_dim(series, -factor.solve(gap), k, 0)
 
         start = jnp.zeros((order + 1, *u.shape)).at[0].set(u)
         return jax.lax.fori_loop(1, order + 1, level, start)
@@ -141,10 +141,10 @@ class PathFactor(Module):
         if rows == columns:
             return cls(matrix, DenseFactor.of(matrix).inverse())
         # least squares by the augmented matrix, which does not square the condition number (Bjorck 1967)
-        whole = jnp.zeros((rows + columns, rows + columns, lanes))
-        whole = whole.at[:rows, :rows].set(jnp.eye(rows)[..., None])
-        whole = whole.at[:rows, rows:].set(matrix).at[rows:, :rows].set(jnp.swapaxes(matrix, 0, 1))
-        return cls(matrix, DenseFactor.of(whole).inverse()[rows:, :rows])
+        augmented = jnp.zeros((rows + columns, rows + columns, lanes))
+        augmented = augmented.at[:rows, :rows].set(jnp.eye(rows)[..., None])
+        augmented = augmented.at[:rows, rows:].set(matrix).at[rows:, :rows].set(jnp.swapaxes(matrix, 0, 1))
+        return cls(matrix, DenseFactor.of(augmented).inverse()[rows:, :rows])
 
     def solve(self, right: Float[Numbers, "row batch"]) -> Float[Numbers, "column batch"]:
         """Return the solution with one step of iterative refinement."""

@@ -70,19 +70,19 @@ def march(equations: PathEquations, start: Any, steps: Any, targets: Any, inner:
     shares = jnp.arange(1.0, POINTS_IN_STEP + 1) / POINTS_IN_STEP
 
     def node(guess: Any, entry: Any) -> Any:
-        step, target, within = entry
+        step, target, values = entry
         corrected = equations.corrected(guess, target)
         factor = corrected.factor
         series = equations.series(corrected.u, factor, target, ORDER)
         powers = (shares * step)[None] ** jnp.arange(ORDER + 1.0)[:, None]
         positions = jnp.sum(series * powers[:, None], axis=0)
-        other = equations.matrix(positions, within) - factor.matrix
-        change = jnp.sum(factor.inverse[:, :, None] * other[None], axis=1)
+        change_ = equations.matrix(positions, values) - factor.matrix
+        change = jnp.sum(factor.inverse[:, :, None] * change_[None], axis=1)
         change = jnp.max(jnp.sum(jnp.abs(change), axis=1))
-        gap = jnp.sum(factor.inverse * equations.residual(positions[None], within)[0][None], axis=1)
+        gap = jnp.sum(factor.inverse * equations.residual(positions[None], values)[0][None], axis=1)
         gap = jnp.max(jnp.abs(gap))
-        moved = jnp.max(jnp.abs(positions - corrected.u))
-        tame = change * gap / jnp.where(moved == 0, 1.0, moved)
+        distance = jnp.max(jnp.abs(positions - corrected.u))
+        tame = change * gap / jnp.where(distance == 0, 1.0, distance)
         result = series[..., 0], corrected.first[0], corrected.last[0], change, gap, tame
         return positions[:, -1:], result
 
@@ -93,7 +93,7 @@ def followed(
     equations: PathEquations,
     start: Float[np.ndarray, " unknown"],
     target: Callable[[Float[np.ndarray, " time"], int], dict[str, Any]],
-    begin: float,
+    start_time: float,
     end: float,
     order: int,
 ) -> Nodes:
@@ -103,7 +103,7 @@ def followed(
     near the series that Newton corrections contract (Deuflhard 2011, Newton Methods for Nonlinear Problems,
     theorem 2.3): the solution at the end is on the branch of that at the start.
     """
-    time = np.linspace(begin, end, FIRST + 1)
+    time = np.linspace(start_time, end, FIRST + 1)
     while True:
         steps = np.diff(time)
         result = _marched(equations, start, time, target, order)
@@ -111,21 +111,21 @@ def followed(
         with np.errstate(invalid="ignore"):
             at_node = (last <= GOOD) & (first <= 2 * NEAR)
             at_node[0] = last[0] <= GOOD
-            passed = (change[:-1] <= CHANGE) & (gap[:-1] <= NEAR) & (tame[:-1] <= TAME) & at_node[1:]
+            has_passed = (change[:-1] <= CHANGE) & (gap[:-1] <= NEAR) & (tame[:-1] <= TAME) & at_node[1:]
         if not at_node[0]:
             return Nodes(time[:1], series[:1], 0)
-        if passed.all():
+        if has_passed.all():
             return Nodes(time, series, None)
-        lost = ~at_node[1:]
-        until = int(np.argmax(lost)) + 1 if lost.any() else len(passed)  # later nodes start from a wrong guess
-        bad = np.flatnonzero(~passed[:until])
-        short = bad[steps[bad] <= SHORTEST * (end - begin)]
-        if short.size:
-            k = int(short[0])
-            if k == bad[0]:
+        is_lost = ~at_node[1:]
+        stop = int(np.argmax(is_lost)) + 1 if is_lost.any() else len(has_passed)  # later nodes start from a wrong guess
+        failures = np.flatnonzero(~has_passed[:stop])
+        too_short = failures[steps[failures] <= SHORTEST * (end - start_time)]
+        if too_short.size:
+            k = int(too_short[0])
+            if k == failures[0]:
                 return Nodes(time[: k + 1], series[: k + 1], k)
-            bad = bad[bad < k]
-        time = np.sort(np.concatenate([time, time[bad] + 0.5 * steps[bad]]))
+            failures = failures[failures < k]
+        time = np.sort(np.concatenate([time, time[failures] + 0.5 * steps[failures]]))
 
 
 def _marched(equations: PathEquations, start: Any, time: Any, target: Any, order: int) -> list[np.ndarray]:
@@ -141,23 +141,23 @@ def _marched(equations: PathEquations, start: Any, time: Any, target: Any, order
         kind: np.moveaxis(array.reshape(*array.shape[:-1], count, POINTS_IN_STEP), -2, 0)
         for kind, array in target(instants, 0).items()
     }
-    guess, parts = np.asarray(start)[:, None], []
-    for begin in range(0, count, BLOCK):
-        block = slice(begin, begin + BLOCK)
+    guess, results = np.asarray(start)[:, None], []
+    for first in range(0, count, BLOCK):
+        block = slice(first, first + BLOCK)
         guess, result = march(equations, guess, steps[block], *jax.tree.map(lambda x, b=block: x[b], (targets, inner)))
-        parts.append(result)
-    return [np.concatenate(x)[: len(time)] for x in zip(*parts, strict=True)]
+        results.append(result)
+    return [np.concatenate(x)[: len(time)] for x in zip(*results, strict=True)]
 
 
 def _filled(array: np.ndarray, order: int) -> np.ndarray:
     """Return series padded with zeros to an order."""
-    missing = order + 1 - len(array)
-    return np.concatenate([array, np.zeros((missing, *array.shape[1:]))]) if missing > 0 else array
+    count = order + 1 - len(array)
+    return np.concatenate([array, np.zeros((count, *array.shape[1:]))]) if count > 0 else array
 
 
 def predicted(nodes: Nodes, time: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time unknown"]:
     """Return the unknowns at instants, by the series of the nodes before them."""
     chosen = np.clip(np.searchsorted(nodes.time, time, side="right") - 1, 0, len(nodes.time) - 1)
-    since = time - nodes.time[chosen]
-    powers = since[:, None] ** np.arange(nodes.series.shape[1])
+    elapsed = time - nodes.time[chosen]
+    powers = elapsed[:, None] ** np.arange(nodes.series.shape[1])
     return np.einsum("tk,tku->tu", powers, nodes.series[chosen])

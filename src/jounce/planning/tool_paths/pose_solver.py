@@ -64,62 +64,62 @@ def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tupl
         Singular values of the task, and its right singular vectors.
     """
     start, *targets = arrays
-    tool, lower, upper, scale, followers, enough, most = constants
+    tool, lower, upper, scale, followers, enough, max_steps = constants
     goal: Goal = dict(zip(kinds, targets, strict=True))
     lower, upper, scale = (jnp.asarray(x)[:, None] for x in (lower, upper, scale))
 
     def missed(x: Any) -> Any:
         return jnp.concatenate([misses(tree, tool, x * scale, goal), FIRM * followers.excess(x)])
 
-    def evaluated(x: Any) -> _Look:
+    def evaluate(x: Any) -> _Look:
         rows = missed(x)
         return _Look(x, rows, columns_of(missed, x), jnp.sum(rows * rows, axis=0))
 
-    def projected_slope(at: _Look) -> tuple[Any, Any]:
-        slope = jnp.sum(at.columns * at.rows[:, None], axis=0)
-        outward = ((at.x <= lower) & (slope > 0)) | ((at.x >= upper) & (slope < 0))
+    def projected_slope(look: _Look) -> tuple[Any, Any]:
+        slope = jnp.sum(look.columns * look.rows[:, None], axis=0)
+        outward = ((look.x <= lower) & (slope > 0)) | ((look.x >= upper) & (slope < 0))
         slope = jnp.where(outward, 0.0, slope)
-        size = jnp.sqrt(jnp.maximum(jnp.sum(at.columns**2, axis=(0, 1)) * at.square, np.finfo(float).tiny))
+        size = jnp.sqrt(jnp.maximum(jnp.sum(look.columns**2, axis=(0, 1)) * look.square, np.finfo(float).tiny))
         return slope, jnp.max(jnp.abs(slope), axis=0) / size
 
-    def step_from(at: _Look, damping: Any) -> Any:
-        slope, _ = projected_slope(at)
-        columns = at.columns * jnp.where(slope == 0, 0.0, 1.0)[None]
+    def next_point(look: _Look, damping: Any) -> Any:
+        slope, _ = projected_slope(look)
+        columns = look.columns * jnp.where(slope == 0, 0.0, 1.0)[None]
         normal = jnp.sum(columns[:, :, None] * columns[:, None], axis=0)
         size = jnp.max(jnp.sum(columns**2, axis=0), axis=0)
-        added = damping * at.square + LEAST * size + np.finfo(float).tiny
-        step = -DenseFactor.of(normal + jnp.eye(len(slope))[..., None] * added[None, None]).solve(slope, refined=False)
-        return jnp.clip(at.x + step, lower, upper)
+        shift = damping * look.square + LEAST * size + np.finfo(float).tiny
+        step = -DenseFactor.of(normal + jnp.eye(len(slope))[..., None] * shift[None, None]).solve(slope, refined=False)
+        return jnp.clip(look.x + step, lower, upper)
 
     def improved(carry: Any) -> Any:
-        best, x, damping, active, count = carry
-        trial = evaluated(x)  # in the first pass the start, which replaces the infinite error
-        better = (trial.square < best.square) & active
+        best, x, damping, is_active, count = carry
+        trial = evaluate(x)  # in the first pass the start, which replaces the infinite error
+        is_better = (trial.square < best.square) & is_active
         model = best.rows + jnp.sum(best.columns * (trial.x - best.x)[None], axis=1)
-        good = best.square - trial.square > 0.25 * (best.square - jnp.sum(model * model, axis=0))
-        changed = jnp.where(better & good, jnp.maximum(damping / GROWTH, FIRST * FIRST), damping * GROWTH)
-        damping = jnp.where(active & (count > 0), changed, damping)
+        is_good = best.square - trial.square > 0.25 * (best.square - jnp.sum(model * model, axis=0))
+        changed = jnp.where(is_better & is_good, jnp.maximum(damping / GROWTH, FIRST * FIRST), damping * GROWTH)
+        damping = jnp.where(is_active & (count > 0), changed, damping)
         best = jax.tree.map(
-            lambda a, b: jnp.where(jnp.reshape(better, (1,) * (a.ndim - 1) + better.shape), a, b), trial, best
+            lambda a, b: jnp.where(jnp.reshape(is_better, (1,) * (a.ndim - 1) + is_better.shape), a, b), trial, best
         )
-        x = step_from(best, damping)
-        moved = jnp.max(jnp.abs(x - best.x), axis=0)
-        active = active & (best.square > enough**2) & (moved > STALLED) & (damping < STIFF)
-        return best, x, damping, active & (projected_slope(best)[1] > FLAT), count + 1
+        x = next_point(best, damping)
+        step_size = jnp.max(jnp.abs(x - best.x), axis=0)
+        is_active = is_active & (best.square > enough**2) & (step_size > STALLED) & (damping < STIFF)
+        return best, x, damping, is_active & (projected_slope(best)[1] > FLAT), count + 1
 
     x = jnp.clip(start[0] / scale, lower, upper)
     rows = jax.eval_shape(missed, x).shape
     nothing = _Look(x, jnp.zeros(rows), jnp.zeros((rows[0], *x.shape)), jnp.full(x.shape[1:], jnp.inf))
-    begin = nothing, x, jnp.full(x.shape[1:], FIRST), jnp.full(x.shape[1:], True), jnp.zeros((), int)
-    state = jax.lax.while_loop(lambda carry: jnp.any(carry[3]) & (carry[4] <= most), improved, begin)
-    best, active = state[0], state[3]
+    initial = nothing, x, jnp.full(x.shape[1:], FIRST), jnp.full(x.shape[1:], True), jnp.zeros((), int)
+    state = jax.lax.while_loop(lambda carry: jnp.any(carry[3]) & (carry[4] <= max_steps), improved, initial)
+    best, is_active = state[0], state[3]
     _, values, shares = singular_values(best.columns[: rows[0] - len(followers.offset)])
-    last = (
+    outputs = (
         best.x * scale,
         best.square,
         projected_slope(best)[1],
-        active.astype(float),
+        is_active.astype(float),
         values,
         jnp.swapaxes(shares, 0, 1),
     )
-    return jax.tree.map(lambda part: part[None], last)
+    return jax.tree.map(lambda output: output[None], outputs)

@@ -56,8 +56,8 @@ def reachable_rows(columns: Float[np.ndarray, "samples row column"]) -> tuple[Fl
     wide = np.concatenate(list(columns), axis=1)
     u, s, _ = np.linalg.svd(wide, full_matrices=False)
     basis = u[:, s > RANK * s[0]]
-    each = np.linalg.svd(columns, compute_uv=False)
-    return basis, int((each > RANK * each[:, :1]).sum(axis=1).max())
+    singular_values = np.linalg.svd(columns, compute_uv=False)
+    return basis, int((singular_values > RANK * singular_values[:, :1]).sum(axis=1).max())
 
 
 def losing_joints(names: tuple[str, ...], shares: Float[np.ndarray, " n"]) -> list[str]:

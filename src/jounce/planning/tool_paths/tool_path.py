@@ -128,26 +128,26 @@ class ToolPath(Displayed):
         >>> (path.position([0.5], order=2)[0].round(6) + 0.0).tolist()
         [[0.5, 0.25, 0.0], [1.0, 1.0, 0.0], [0.0, 2.0, 0.0]]
         """
-        times, positions_given = check_samples(times, positions)
-        if positions_given.ndim != 2 or positions_given.shape[1] != 3:
-            raise TrajectoryError(f"must have the shape (samples, 3), not {positions_given.shape}", name="positions")
-        laws = [SplineMotion(times, column, degree) for column in positions_given.T]
-        turned = None if orientations is None else rotation_matrices("orientations", orientations)
-        if turned is not None and turned.ndim > 2:
-            turned = AttitudeSamples.from_rotation_matrices(times, turned, degree)
+        times, points = check_samples(times, positions)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise TrajectoryError(f"must have the shape (samples, 3), not {points.shape}", name="positions")
+        laws = [SplineMotion(times, column, degree) for column in points.T]
+        rotations = None if orientations is None else rotation_matrices("orientations", orientations)
+        if rotations is not None and rotations.ndim > 2:
+            rotations = AttitudeSamples.from_rotation_matrices(times, rotations, degree)
         bounds = {"start": float(times[0]), "stop": float(times[-1]), **settings}
-        return cls(laws, turned, **bounds)
+        return cls(laws, rotations, **bounds)
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """Kinds of the goals: "position", "rotation", "direction"."""
-        parts = {"position": self._position, "rotation": self._attitude, "direction": self._direction}
-        return tuple(kind for kind, part in parts.items() if part is not None)
+        goals = {"position": self._position, "rotation": self._attitude, "direction": self._direction}
+        return tuple(kind for kind, goal in goals.items() if goal is not None)
 
     @property
     def highest(self) -> int:
         """Highest derivative that is continuous, according to the degrees of splines."""
-        laws = [law for part in (self._position, self._direction) if part is not None for law in part.laws.values()]
+        laws = [law for x in (self._position, self._direction) if x is not None for law in x.laws.values()]
         degrees = [law.degree for law in laws if type(law) is SplineMotion]
         if isinstance(self._attitude, AttitudeSamples):
             degrees.append(self._attitude.degree)
@@ -158,17 +158,17 @@ class ToolPath(Displayed):
         """Inner instants at which a derivative of a law is known to jump, without those of `abs` in expressions."""
         if self._progress is not None:  # the argument of the other laws is not time
             return knots(self._progress.laws["progress"], self.start, self.stop)
-        turning = self._attitude[1] if isinstance(self._attitude, tuple) else None
-        parts = [part for part in (self._position, self._direction, turning) if part is not None]
-        instants = [knots(law, self.start, self.stop) for part in parts for law in part.laws.values()]
-        every = np.unique(np.concatenate([np.zeros(0), *instants]))
-        return every[(every > self.start) & (every < self.stop)]
+        angles = self._attitude[1] if isinstance(self._attitude, tuple) else None
+        trajectories = [x for x in (self._position, self._direction, angles) if x is not None]
+        instants = [knots(law, self.start, self.stop) for x in trajectories for law in x.laws.values()]
+        instants_ = np.unique(np.concatenate([np.zeros(0), *instants]))
+        return instants_[(instants_ > self.start) & (instants_ < self.stop)]
 
     def judge(self, order: int) -> None:
         """Warn, as `JointTrajectory` does, if the samples of a law do not support its derivatives to an order."""
-        for part in (self._position, self._direction, self._progress):
-            if part is not None:
-                part.derivatives([part.start], order)
+        for x in (self._position, self._direction, self._progress):
+            if x is not None:
+                x.derivatives([x.start], order)
 
     def __repr__(self) -> str:
         return f"<ToolPath of {', '.join(self.kinds)}; {self.start:g} to {self.stop:g} s>"
@@ -206,15 +206,15 @@ class ToolPath(Displayed):
         if self._progress is not None:
             rates = self._progress.derivatives(times, order)[:, :, 0]
             time = Jet.from_derivatives(np.moveaxis(rates, -1, 0))
-            inside = self._position or self._direction
-            if inside is not None:  # rounding may exceed the range of the laws
+            trajectory = self._position or self._direction
+            if trajectory is not None:  # rounding may exceed the range of the laws
                 first = np.asarray(time.coefficients[0])
-                nearest = np.clip(first, inside.start, inside.stop)
-                beyond = np.abs(first - nearest) > ROUNDING * (inside.stop - inside.start)
-                if beyond.any():
-                    message = f"has a spike at {times[beyond][0]:.9g} s, too narrow to have been seen"
-                    raise TrajectoryError(message, name="progress", value=float(first[beyond][0]))
-                time = Jet((jnp.asarray(nearest), *time.coefficients[1:]))
+                clipped = np.clip(first, trajectory.start, trajectory.stop)
+                is_beyond = np.abs(first - clipped) > ROUNDING * (trajectory.stop - trajectory.start)
+                if is_beyond.any():
+                    message = f"has a spike at {times[is_beyond][0]:.9g} s, too narrow to have been seen"
+                    raise TrajectoryError(message, name="progress", value=float(first[is_beyond][0]))
+                time = Jet((jnp.asarray(clipped), *time.coefficients[1:]))
         goal: Goal = {}
         if self._position is not None:
             goal["position"] = self._position(time)
@@ -226,8 +226,8 @@ class ToolPath(Displayed):
         series = {kind: np.asarray(stacked(jet)) for kind, jet in goal.items()}
         for kind, array in series.items():
             if not np.isfinite(array).all():
-                bad = int(np.argwhere(~np.isfinite(array))[0, -1])
-                message = f"the law of the {kind} is not defined or not smooth at {times[bad]:.9g} s"
+                lane = int(np.argwhere(~np.isfinite(array))[0, -1])
+                message = f"the law of the {kind} is not defined or not smooth at {times[lane]:.9g} s"
                 raise TrajectoryError(message, name=kind)
         return series
 
@@ -237,8 +237,8 @@ class ToolPath(Displayed):
             return attitude.attitude(time)
         if isinstance(attitude, tuple):
             return rotation_matrix(attitude[0], attitude[1](time))
-        fixed = jnp.broadcast_to(jnp.asarray(attitude)[..., None], (3, 3, *time.shape))
-        return Jet.constant(fixed, time.order)
+        constant = jnp.broadcast_to(jnp.asarray(attitude)[..., None], (3, 3, *time.shape))
+        return Jet.constant(constant, time.order)
 
 
 def _three(name: str, laws: Any, keys: tuple[str, ...], start: float, stop: float) -> JointTrajectory:
@@ -251,38 +251,38 @@ def _laws(name: str, laws: Mapping[str, Any], start: float, stop: float) -> Join
     try:
         return JointTrajectory(laws, start, stop)
     except JounceError as error:
-        inside = (error.name or "").removeprefix("laws").removeprefix(".")
-        location = f"{name}.{inside}" if error.name and error.name.startswith("laws") and inside != name else name
+        key = (error.name or "").removeprefix("laws").removeprefix(".")
+        location = f"{name}.{key}" if error.name and error.name.startswith("laws") and key != name else name
         raise error.located(name=location if error.name and error.name.startswith("laws") else error.name) from None
 
 
 def _reach(progress: JointTrajectory) -> tuple[float, float]:
     """Return the least and the largest value of a law of progress, refined between sampled instants."""
 
-    def both(times: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time 2"]:
+    def negated_and_values(times: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time 2"]:
         values = progress.derivatives(times, 0)[:, 0, 0]
         return np.stack([-values, values], axis=-1)
 
     grid = np.linspace(progress.start, progress.stop, INSTANTS)
-    measures = both(grid)
-    peaks, largest = local_maxima(measures), measures.max(axis=0)
+    measures = negated_and_values(grid)
+    peaks, extremes = local_maxima(measures), measures.max(axis=0)
     low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, INSTANTS - 1)]
     for _ in range(ROUNDS):
         near = np.linspace(low, high, POINTS)
-        refined = both(near.ravel()).reshape(*near.shape, 2)[:, :, [0, 1], [0, 1]]
-        largest, top = np.maximum(largest, refined.max(axis=(0, 1))), np.argmax(refined, axis=0)
+        refined = negated_and_values(near.ravel()).reshape(*near.shape, 2)[:, :, [0, 1], [0, 1]]
+        extremes, top = np.maximum(extremes, refined.max(axis=(0, 1))), np.argmax(refined, axis=0)
         low, high = (np.take_along_axis(near, np.clip(top + step, 0, POINTS - 1)[None], axis=0)[0] for step in (-1, 1))
-    return float(-largest[0]), float(largest[1])
+    return float(-extremes[0]), float(extremes[1])
 
 
-def _attitude(given: Any, start: float, stop: float) -> Any:
+def _attitude(orientation: Any, start: float, stop: float) -> Any:
     """Return an orientation: constant, samples, or a sequence with laws of its angles."""
-    if isinstance(given, AttitudeSamples):
-        return given
-    if isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], str):
-        check_sequence(given[0], TrajectoryError, "orientation")
-        return given[0], _three("orientation", given[1], ANGLES, start, stop)
-    rotations = rotation_matrices("orientation", given)
+    if isinstance(orientation, AttitudeSamples):
+        return orientation
+    if isinstance(orientation, tuple) and len(orientation) == 2 and isinstance(orientation[0], str):
+        check_sequence(orientation[0], TrajectoryError, "orientation")
+        return orientation[0], _three("orientation", orientation[1], ANGLES, start, stop)
+    rotations = rotation_matrices("orientation", orientation)
     if rotations.shape != (3, 3):
         message = "a constant orientation is one quaternion or matrix; ToolPath.through takes one for each instant"
         raise TrajectoryError(message, name="orientation", value=f"shape {rotations.shape}")

@@ -111,27 +111,29 @@ class ToolPathMotion(Displayed):
         self.order = whole_number("order", order, 0, MAX_ORDER)
         self.time = _instants(path, time)
         path.judge(min(self.order, path.highest))
-        lost, self.ending = (Status.OK, "") if nodes.failed is None else self._why()
-        until = nodes.time[-1] if nodes.failed is not None else np.inf
-        reached = self.time <= until
-        inside = np.where(reached, self.time, nodes.time[-1])
-        series = target(inside, self.order)
+        end_status, self.ending = (Status.OK, "") if nodes.failed is None else self._why()
+        end_time = nodes.time[-1] if nodes.failed is not None else np.inf
+        is_reached = self.time <= end_time
+        clipped = np.where(is_reached, self.time, nodes.time[-1])
+        series = target(clipped, self.order)
         names = tuple(series)
-        arrays = (predicted(nodes, inside)[:, None], *(_by_instant(series[name]) for name in names))
+        arrays = (predicted(nodes, clipped)[:, None], *(_by_instant(series[name]) for name in names))
         constants = (equations.tool, equations.basis, equations.scale, equations.weights)
         static = (equations.fixed_joints, equations.kinds, equations.count)
-        solved = [np.asarray(x) for x in _along(robot, arrays, constants, (names, static, self.order))]
-        self.q, missed, _, last, values, shares = solved
+        results = [np.asarray(x) for x in _along(robot, arrays, constants, (names, static, self.order))]
+        self.q, missed, _, corrections, values, shares = results
         self.residual: Float[np.ndarray, "time derivative"] = np.abs(missed).max(axis=-1)
         self.singular_values = values[:, 0, :rank]
         self._shares = shares[:, 0, max(rank - 1, 0)]
         self.singular = self.singular_values[:, -1] <= SINGULAR * self.singular_values[:, 0]
-        self.status: Int[np.ndarray, " time"] = self._judged(series, reached, last[:, 0], lost)
+        self.status: Int[np.ndarray, " time"] = self._judged(series, is_reached, corrections[:, 0], end_status)
         for array in (self.q, self.residual, self.singular_values):
-            array[~reached] = np.nan
+            array[~is_reached] = np.nan
         self.q[(self.status != Status.OK) & (self.status != Status.INADMISSIBLE)] = np.nan
 
-    def _judged(self, series: dict[str, Any], reached: np.ndarray, last: np.ndarray, lost: Status) -> np.ndarray:
+    def _judged(
+        self, series: dict[str, Any], is_reached: np.ndarray, corrections: np.ndarray, end_status: Status
+    ) -> np.ndarray:
         equations, nodes, _, _, ranges = self._parts
         status = np.full(len(self.time), int(Status.OK))
         if ranges is not None:
@@ -145,14 +147,14 @@ class ToolPathMotion(Displayed):
             np.abs(_by_instant(series[kind])).reshape(len(self.time), self.order + 1, -1) for kind in equations.kinds
         ]
         size = np.concatenate(sizes, axis=-1).max(axis=-1) / min(1.0, float(equations.tool.length))
-        off = self.residual > RATES * (np.maximum.accumulate(size, axis=1) + 1.0) * self._factorials()
-        off[:, 0] = self.residual[:, 0] > MET
-        status[off.any(axis=1)] = int(Status.NOT_ASSEMBLED)
-        status[~(last <= MET)] = int(Status.NOT_CONVERGED)
+        is_off = self.residual > RATES * (np.maximum.accumulate(size, axis=1) + 1.0) * self._factorials()
+        is_off[:, 0] = self.residual[:, 0] > MET
+        status[is_off.any(axis=1)] = int(Status.NOT_ASSEMBLED)
+        status[~(corrections <= MET)] = int(Status.NOT_CONVERGED)
         status[~np.isfinite(self.q).all(axis=(1, 2))] = int(Status.SINGULAR)
-        status[~reached] = int(Status.NOT_REACHED)
-        if nodes.failed is not None and (~reached).any():
-            status[np.flatnonzero(~reached)[np.argmin(self.time[~reached])]] = int(lost)
+        status[~is_reached] = int(Status.NOT_REACHED)
+        if nodes.failed is not None and (~is_reached).any():
+            status[np.flatnonzero(~is_reached)[np.argmin(self.time[~is_reached])]] = int(end_status)
         return status
 
     def _factorials(self) -> np.ndarray:
@@ -168,56 +170,56 @@ class ToolPathMotion(Displayed):
         ends = target(np.array([time, min(time + gap, self.path.stop)]), 0)
         jump = max(float(np.abs(ends[kind][0, ..., 1] - ends[kind][0, ..., 0]).max()) for kind in equations.kinds)
         values, shares = _singular(self.robot, equations, u[: equations.count])
-        lost = ", ".join(losing_joints(self.robot.joint_names, shares[rank - 1]))
+        names = ", ".join(losing_joints(self.robot.joint_names, shares[rank - 1]))
         if values[rank - 1] <= WEAK * values[0]:
             return Status.SINGULAR, (
                 f"the path runs into a singular position at t = {time_text(time)} s, where the "
-                f"motions of {lost} cancel at "
+                f"motions of {names} cancel at "
                 f"the tool (singular values from {values[0]:.2g} down to {values[rank - 1]:.2g}); let the path "
                 "avoid it, or begin on another branch"
             )
         if jump > JUMP:
             return Status.BRANCH_JUMP, f"the path jumps at t = {time_text(time)} s; its laws must be continuous"
         if equations.has_posture or equations.fixed_joints:
-            kind, other = (
+            kind, remedy = (
                 ("posture", "posture, other weights") if equations.has_posture else ("joints held", "law of them")
             )
             return Status.SINGULAR, (
                 f"the path is singular with the {kind} at t = {time_text(time)} s: the coordinates reverse there; give "
-                f"another {other}, or another start"
+                f"another {remedy}, or another start"
             )
         return Status.SINGULAR, (
             f"the path could not be followed beyond t = {time_text(time)} s: no motion of the joints continues it there"
         )
 
     def __repr__(self) -> str:
-        solved = int((self.status == Status.OK).sum())
-        return f"<ToolPathMotion of {self.robot.name}: {solved} of {len(self.time)} instants to order {self.order}>"
+        count = int((self.status == Status.OK).sum())
+        return f"<ToolPathMotion of {self.robot.name}: {count} of {len(self.time)} instants to order {self.order}>"
 
     def explain(self, index: int) -> str:
         """Return the result at an instant in words: the failure and its cause, and the joints that lose a motion."""
-        status, time, words = Status(int(self.status[index])), float(self.time[index]), []
+        status, time, phrases = Status(int(self.status[index])), float(self.time[index]), []
         if status in (Status.SINGULAR, Status.BRANCH_JUMP, Status.NOT_REACHED):
             return self.ending or f"singular at t = {time_text(time)} s"
         if status == Status.NOT_ASSEMBLED:
-            words.append(
+            phrases.append(
                 f"the joints cannot keep the tool on the path at t = {time_text(time)} s: the pose misses it by "
                 f"{self.residual[index, 0]:.3g} rad, or sizes of the robot, or a derivative does; prescribe less, such "
                 "as a direction instead of an orientation"
             )
         if status == Status.NOT_CONVERGED:
-            words.append(f"not converged at t = {time_text(time)} s")
+            phrases.append(f"not converged at t = {time_text(time)} s")
         if status == Status.INADMISSIBLE:
             k = int(np.argmax(self._outside[index]))
             name = (*self.robot.joint_names, *SharedFollowers.of(self.robot).names)[k]
-            words.append(
+            phrases.append(
                 f"{name} leaves its range at t = {time_text(time)} s, where it is {self._places[index, k]:.6g}; choose "
                 "another start, posture or path, or limits=False"
             )
         if self.singular[index]:
-            lost = ", ".join(losing_joints(self.robot.joint_names, self._shares[index]))
-            words.append(f"nearly singular at t = {time_text(time)} s: the motions of {lost} cancel at the tool")
-        return "; ".join(words) or "followed"
+            names = ", ".join(losing_joints(self.robot.joint_names, self._shares[index]))
+            phrases.append(f"nearly singular at t = {time_text(time)} s: the motions of {names} cancel at the tool")
+        return "; ".join(phrases) or "followed"
 
     def at(self, time: ArrayLike, order: int | None = None) -> "ToolPathMotion":
         """Return the motion at other instants, without following the path again.
@@ -248,8 +250,8 @@ class ToolPathMotion(Displayed):
             too narrow to be followed; the message names the instant.
         """
         if (self.status != Status.OK).any():
-            bad = int(np.argmax(self.status != Status.OK))
-            raise TrajectoryError(f"there are no coordinates: {self.explain(bad)}", name=f"time[{bad}]")
+            index = int(np.argmax(self.status != Status.OK))
+            raise TrajectoryError(f"there are no coordinates: {self.explain(index)}", name=f"time[{index}]")
         order = max(self.order, min(LEAST, self.path.highest))
         times, q = followed_closely(self._exact(order), self.time, self.path.knots)
         laws = {name: HermiteMotion(times, q[:, :, k]) for k, name in enumerate(self.robot.joint_names)}
@@ -259,25 +261,25 @@ class ToolPathMotion(Displayed):
         """Return the function from instants to coordinates and their derivatives."""
 
         def exact(instants: np.ndarray) -> np.ndarray:
-            return in_chunks(lambda some: known(instants[some]), len(instants), BLOCKS, axis=0)
+            return in_chunks(lambda chunk: checked(instants[chunk]), len(instants), BLOCKS, axis=0)
 
-        def known(instants: np.ndarray) -> np.ndarray:
+        def checked(instants: np.ndarray) -> np.ndarray:
             motion = self.at(instants, order)
             if (motion.status != Status.OK).any():
-                bad = int(np.argmax(motion.status != Status.OK))
-                raise TrajectoryError(f"there are no coordinates: {motion.explain(bad)}", name="time")
+                index = int(np.argmax(motion.status != Status.OK))
+                raise TrajectoryError(f"there are no coordinates: {motion.explain(index)}", name="time")
             return motion.q
 
         return exact
 
 
 def _instants(path: ToolPath, time: Any) -> np.ndarray:
-    given = np.linspace(path.start, path.stop, INSTANTS) if time is None else time
-    instants = np.atleast_1d(seconds("time", given, TrajectoryError))
+    values = np.linspace(path.start, path.stop, INSTANTS) if time is None else time
+    instants = np.atleast_1d(seconds("time", values, TrajectoryError))
     slack = 1e-9 * (path.stop - path.start)
-    outside = ~((instants >= path.start - slack) & (instants <= path.stop + slack))
-    if instants.ndim != 1 or outside.any():
-        value = float(instants[np.argmax(outside)]) if instants.ndim == 1 else f"shape {instants.shape}"
+    is_outside = ~((instants >= path.start - slack) & (instants <= path.stop + slack))
+    if instants.ndim != 1 or is_outside.any():
+        value = float(instants[np.argmax(is_outside)]) if instants.ndim == 1 else f"shape {instants.shape}"
         message = f"must be instants from {path.start:.9g} to {path.stop:.9g} s"
         raise TrajectoryError(message, name="time", value=value)
     return np.clip(instants, path.start, path.stop)

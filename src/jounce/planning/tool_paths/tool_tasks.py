@@ -103,10 +103,10 @@ def misses(tree: Tree, tool: Tool, q: Any, goal: Goal) -> Float[Numbers, "row ba
     return jnp.concatenate(rows)
 
 
-def columns_of(function: Any, at: Float[Numbers, "column batch"]) -> Float[Numbers, "row column batch"]:
+def columns_of(function: Any, point: Float[Numbers, "column batch"]) -> Float[Numbers, "row column batch"]:
     """Return the Jacobian of a function of coordinates, batch last, by forward differentiation along each."""
-    units = jnp.broadcast_to(jnp.eye(len(at))[..., None], (len(at), *at.shape))
-    return jax.vmap(lambda unit: jax.jvp(function, (at,), (unit,))[1], out_axes=1)(units)
+    units = jnp.broadcast_to(jnp.eye(len(point))[..., None], (len(point), *point.shape))
+    return jax.vmap(lambda unit: jax.jvp(function, (point,), (unit,))[1], out_axes=1)(units)
 
 
 def rotation_matrices(name: str, value: "ArrayLike | Rotation") -> Float[np.ndarray, "*batch 3 3"]:
@@ -127,8 +127,8 @@ def rotation_matrices(name: str, value: "ArrayLike | Rotation") -> Float[np.ndar
         check_rotation(np.moveaxis(flat, 0, -1), name)
         return Rotation.from_matrix(flat).as_matrix().reshape(array.shape)  # orthonormalizes printed digits
     if array.ndim >= 1 and array.shape[-1] == 4:
-        turned = Rotation.from_quat(np.roll(_units(name, array.reshape(-1, 4)), -1, axis=-1))
-        return turned.as_matrix().reshape(*array.shape[:-1], 3, 3)
+        rotations = Rotation.from_quat(np.roll(_units(name, array.reshape(-1, 4)), -1, axis=-1))
+        return rotations.as_matrix().reshape(*array.shape[:-1], 3, 3)
     message = f"must be unit quaternions, (..., 4), scalar first, or matrices, (..., 3, 3), not {array.shape}"
     raise RobotError(message, name=name)
 
@@ -152,9 +152,9 @@ def unit_vectors(name: str, value: ArrayLike) -> Float[np.ndarray, "*batch 3"]:
 
 def _units(name: str, array: np.ndarray) -> np.ndarray:
     norm = np.linalg.norm(array, axis=-1, keepdims=True)
-    far = ~(np.abs(norm[:, 0] - 1.0) <= UNIT)
-    if far.any():
-        first = int(np.argmax(far))
+    is_far = ~(np.abs(norm[:, 0] - 1.0) <= UNIT)
+    if is_far.any():
+        first = int(np.argmax(is_far))
         message = "a quaternion must be of unit length, scalar first; its length is"
         raise RobotError(message, name=f"{name}[{first}]", value=float(norm[first, 0]))
     return array / norm

@@ -14,39 +14,39 @@ IDLE = 1e-9  # fraction of the largest value of a quantity: smaller values count
 
 def check_possible(source: Source, labels: Labels, start: float, stop: float, *, bounded: bool = False) -> None:
     """Raise TrajectoryError if a limit is exceeded at rest, or if no limited quantity changes on a part of the path."""
-    near = SIDE_OFFSET * (stop - start) * np.array([-1.0, 1.0])
+    offsets = SIDE_OFFSET * (stop - start) * np.array([-1.0, 1.0])
     even = np.linspace(start, stop, POINTS)
-    s = np.union1d(even, (source.changes[:, None] + near).reshape(-1))
+    s = np.union1d(even, (source.changes[:, None] + offsets).reshape(-1))
     quantities = source(s)
-    at_rest = quantities.second[:, :, G]
-    spare = np.minimum(_relative_margin(quantities.upper, at_rest), _relative_margin(-quantities.lower, -at_rest))
-    if spare.size and spare.min() <= STATIC:
-        at, column = np.unravel_index(np.argmin(spare), spare.shape)
-        label, value = labels.second[column], float(at_rest[at, column])
-        limit = float((quantities.upper if value > 0 else quantities.lower)[at, column])
-        where = source.location(float(s[at]))
+    static = quantities.second[:, :, G]
+    margins = np.minimum(_relative_margin(quantities.upper, static), _relative_margin(-quantities.lower, -static))
+    if margins.size and margins.min() <= STATIC:
+        point, column = np.unravel_index(np.argmin(margins), margins.shape)
+        label, value = labels.second[column], float(static[point, column])
+        limit = float((quantities.upper if value > 0 else quantities.lower)[point, column])
+        place = source.location(float(s[point]))
         message = (
-            f"the path cannot be stopped everywhere: at {where} standing still requires a {label.word} of {value:.6g} "
+            f"the path cannot be stopped everywhere: at {place} standing still requires a {label.word} of {value:.6g} "
             f"{label.unit}, and the limit is {limit:.6g} {label.unit}; motions that pass only by momentum are not "
             "supported; choose another path, or a smaller load"
         )
         raise TrajectoryError(message, name=label.owner)
     if bounded:
         return
-    moving = _moving(quantities, rates=True)[np.isin(s, even)]
-    idle = moving < IDLE
+    speeds = _moving(quantities, rates=True)[np.isin(s, even)]
+    idle = speeds < IDLE
     stops = np.flatnonzero(idle[1:] & idle[:-1])  # a single idle point may be a stop of the motion
     if len(stops):
-        where = source.location(float(even[stops[0]]))
-        message = f"nothing with a limit moves at {where}, so that there is no fastest law; give more limits"
+        place = source.location(float(even[stops[0]]))
+        message = f"nothing with a limit moves at {place}, so that there is no fastest law; give more limits"
         raise TrajectoryError(message, name="limits")
 
 
 @np.errstate(invalid="ignore")
-def _relative_margin(bound: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
+def _relative_margin(bound: np.ndarray, rest_values: np.ndarray) -> np.ndarray:
     """Return the margin to an upper bound, relative to the larger of value and bound; infinite without a bound."""
-    size = np.maximum(np.maximum(np.abs(bound), np.abs(at_rest)), np.finfo(float).tiny)
-    return np.where(np.isfinite(bound), (bound - at_rest) / size, np.inf)
+    size = np.maximum(np.maximum(np.abs(bound), np.abs(rest_values)), np.finfo(float).tiny)
+    return np.where(np.isfinite(bound), (bound - rest_values) / size, np.inf)
 
 
 def bounded_everywhere(source: Source, start: float, stop: float) -> bool:
@@ -58,11 +58,11 @@ def _moving(quantities: PathQuantities, *, rates: bool) -> Float[np.ndarray, " p
     """Return the largest coefficient of a limited quantity at each point, relative to its largest along the path."""
     limited = np.isfinite(quantities.upper) | np.isfinite(quantities.lower)
     limited |= rates & (np.isfinite(quantities.rate_upper) | np.isfinite(quantities.rate_lower))
-    parts = [
+    sizes = [
         np.abs(quantities.first) * np.isfinite(quantities.first_bounds),
         np.abs(quantities.second[:, :, :G]).max(axis=-1, initial=0.0) * limited,
         np.abs(quantities.vectors).max(axis=(-1, -2), initial=0.0),
         np.abs(quantities.fourth).max(axis=-1, initial=0.0) * rates,
     ]
-    shares = np.concatenate([x / np.maximum(x.max(axis=0, initial=0.0), 1e-300) for x in parts], axis=1)
+    shares = np.concatenate([x / np.maximum(x.max(axis=0, initial=0.0), 1e-300) for x in sizes], axis=1)
     return shares.max(axis=1, initial=0.0)

@@ -138,12 +138,12 @@ def limits_of(robot: Robot, limits: GivenLimits | None) -> MotionLimits:
                 raise RobotError("must be Limits", name=f"limits.{name}", value=entry)
     for point in given.points:
         check_name("link", point.link, robot.frames, RobotError, name="limits")
-    own = {name: given.joints.get(name, robot.joints[name].limits) for name in robot.joint_names}
-    constant = {name: dataclasses.replace(x, **_nothing(given.varying.get(name, {}))) for name, x in own.items()}
+    chosen = {name: given.joints.get(name, robot.joints[name].limits) for name in robot.joint_names}
+    constant = {name: dataclasses.replace(x, **_nothing(given.varying.get(name, {}))) for name, x in chosen.items()}
     joints = robot.limits_with(constant)  # where a law replaces the limit, only limits of joints that follow remain
     varying = {name: _with_followers(laws, constant[name], joints[name]) for name, laws in given.varying.items()}
     reverse = robot.limits_with(
-        {name: dataclasses.replace(x, **_given(given.backward, name)) for name, x in own.items()}
+        {name: dataclasses.replace(x, **_given(given.backward, name)) for name, x in chosen.items()}
     )
     backward = {  # with limits of the joints that follow
         name: Limits(**{field: getattr(reverse[name], field) for field in directed(entry)})
@@ -161,12 +161,12 @@ def _nothing(laws: Mapping[str, PositionLaw]) -> dict[str, None]:
     return {field: None for field in laws if field != "jounce"}
 
 
-def _with_followers(laws: Mapping[str, PositionLaw], own: Limits, joined: Limits) -> dict[str, PositionLaw]:
+def _with_followers(laws: Mapping[str, PositionLaw], limits: Limits, merged: Limits) -> dict[str, PositionLaw]:
     """Return the laws of a joint, bounded by the limits of the joints that follow it."""
-    whole = dict(laws)
-    if "acceleration" in laws and own.deceleration is None and joined.deceleration is not None:
-        whole.setdefault("deceleration", laws["acceleration"])
-    return {field: _least(law, getattr(joined, field, None)) for field, law in whole.items()}
+    bounded = dict(laws)
+    if "acceleration" in laws and limits.deceleration is None and merged.deceleration is not None:
+        bounded.setdefault("deceleration", laws["acceleration"])
+    return {field: _least(law, getattr(merged, field, None)) for field, law in bounded.items()}
 
 
 def _least(law: PositionLaw, bound: float | None) -> PositionLaw:

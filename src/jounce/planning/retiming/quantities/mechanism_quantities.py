@@ -68,24 +68,24 @@ class MechanismQuantities:
             if not isinstance(entry, Limits):
                 raise MechanismError("must be Limits", name=f"limits.{name}", value=entry)
         instants = np.asarray(instants_of(mechanism.time, mechanism.parameter_values), float)
-        first, last = float(instants[0]), float(instants[-1])
+        start, stop = float(instants[0]), float(instants[-1])
         outputs = {name: mechanism.outputs[name] for name in self.limits if name in mechanism.outputs}
-        bare = dataclasses.replace(mechanism, outputs=outputs)
-        grid = np.linspace(first, last, SAMPLES)
-        motion = solve(bare, grid, ORDER + 2)
+        reduced = dataclasses.replace(mechanism, outputs=outputs)
+        grid = np.linspace(start, stop, SAMPLES)
+        motion = solve(reduced, grid, ORDER + 2)
         self.mechanism = motion.actuated
         self.laws = {name: _law_of(self.mechanism, name) for name in self.mechanism.drivers}
-        self.path = Path(self.laws, first, last)
+        self.path = Path(self.laws, start, stop)
         self.drivers, self.outputs = list(self.mechanism.drivers), list(outputs)
         self.loaded = [k for k in self.drivers if self._has(k, "effort", "effort_rate")]
         self.scalar = [k for k in self.outputs if motion.outputs[k].ndim == 2]
         self.vector = [k for k in self.outputs if k not in self.scalar]
         values = [motion.outputs[name] for name in self.scalar]
-        driven = [np.asarray(motion.driver(name).values) for name in self.drivers]
+        driver_values = [np.asarray(motion.driver(name).values) for name in self.drivers]
         self.numbers = [*self.drivers, *self.scalar]
-        joined = [x[:, : ORDER + 1] for x in (*driven, *values)]
+        columns = [x[:, : ORDER + 1] for x in (*driver_values, *values)]
         vectors = [motion.outputs[name][:, 1:3].reshape(SAMPLES, -1) for name in self.vector]
-        self.motions = _Table(grid, np.stack(joined, axis=-1))
+        self.motions = _Table(grid, np.stack(columns, axis=-1))
         self.sizes = [x.shape[1] // 2 for x in vectors]
         self.vectors = _Table(grid, np.concatenate([*vectors, np.zeros((SAMPLES, 0))], axis=1))
         if self.loaded:
@@ -110,32 +110,32 @@ class MechanismQuantities:
         m, c, m1, c1 = np.moveaxis(self.inertia(np.clip(s, self.path.start, self.path.stop)), 1, 0)
         k = SPEEDS[:, None, None]
         s1, s2 = s1[:, None], s2[:, None]
-        rest = np.stack([x[0] for x in forces]) - k**2 * (m * s2 + c * s1**2)
+        remainder = np.stack([x[0] for x in forces]) - k**2 * (m * s2 + c * s1**2)
         inertial = k**3 * ((m1 + 2 * c) * s1 * s2 + c1 * s1**3)
         third = np.asarray(progress(Jet.variable(jnp.asarray(times), 3)).dense().derivatives())[3][:, None]
         rates = np.stack([x[1] for x in forces]) - inertial - k**3 * m * third
-        g, d, c_rest = np.einsum("ij,jpn->ipn", np.linalg.inv(np.vander(SPEEDS, increasing=True)), rest)
+        g, d, c_rest = np.einsum("ij,jpn->ipn", np.linalg.inv(np.vander(SPEEDS, increasing=True)), remainder)
         slow = s1 < SLOW * s1.mean()
         safe = np.where(slow, 1.0, s1)
         d, c_rest = np.where(slow, 0.0, d / safe), np.where(slow, 0.0, c_rest / safe**2)
-        g = np.where(slow, rest[1], g)
+        g = np.where(slow, remainder[1], g)
         rates = rates - k**2 * d * s2 - k**3 * 2 * c_rest * s1 * s2
         g1, d1, c1_rest = np.einsum("ij,jpn->ipn", np.linalg.inv(SPEEDS[:, None] ** [1, 2, 3]), rates)
         d1, c1_rest = np.where(slow, 0.0, d1 / safe**2), np.where(slow, 0.0, c1_rest / safe**3)
         g1 = np.where(slow, 0.0, g1 / safe)
-        whole = np.stack([m, c + c_rest, d, g, m1, c1 + c1_rest, d1, g1], axis=1)
-        moving = np.append(True, np.diff(s) > 0)
-        self.forces = _Table(s[moving], whole[moving])
+        coefficients = np.stack([m, c + c_rest, d, g, m1, c1 + c1_rest, d1, g1], axis=1)
+        increases = np.append(True, np.diff(s) > 0)
+        self.forces = _Table(s[increases], coefficients[increases])
 
     def __call__(self, s: _Points) -> PathQuantities:
         """Return the quantities at values of s."""
         motion = self.motions(s)
         _, q1, q2, q3 = np.moveaxis(motion, 1, 0)
         vectors = np.split(self.vectors(s), np.cumsum([2 * n for n in self.sizes])[:-1], axis=1) if self.sizes else []
-        moved = [np.moveaxis(x.reshape(len(s), 2, -1), 1, -1) for x in vectors]
-        vector = np.zeros((len(s), len(moved), 3, 2))
-        for k, part in enumerate(moved):
-            vector[:, k, : part.shape[1]] = part
+        curves = [np.moveaxis(x.reshape(len(s), 2, -1), 1, -1) for x in vectors]
+        vector = np.zeros((len(s), len(curves), 3, 2))
+        for k, curve in enumerate(curves):
+            vector[:, k, : curve.shape[1]] = curve
         first = np.concatenate([q1, np.linalg.norm(vector[..., 0], axis=-1)], axis=1)
         nothing = np.zeros_like(q1)
         second = np.stack([q1, q2, nothing, nothing, q2, q3, nothing, nothing], axis=-1)
@@ -147,9 +147,9 @@ class MechanismQuantities:
             rates = np.concatenate([rates, self._bounds(self.loaded, "effort_rate", s)], axis=1)
         speeds = self._bounds([*names, *self.vector], "velocity", s)
         accelerations = self._bounds(self.vector, "acceleration", s)
-        none = np.zeros((len(s), 0))
+        empty = np.zeros((len(s), 0))
         fourth = np.zeros((len(s), 0, 4))
-        return PathQuantities(first, speeds, second, -upper, upper, -rates, rates, vector, accelerations, fourth, none)
+        return PathQuantities(first, speeds, second, -upper, upper, -rates, rates, vector, accelerations, fourth, empty)
 
     def location(self, s: float) -> str:
         """Return a description of a place on the path for messages."""
@@ -167,8 +167,8 @@ class MechanismQuantities:
         forces = [np.asarray(driver_force(motion, name).values) for name in self.loaded]
 
         def column(arrays: Sequence[Any], level: int) -> np.ndarray:
-            parts = [x[:, level] if x.ndim == 2 else np.linalg.norm(x[:, level], axis=-1) for x in arrays]
-            return np.stack([*parts, np.zeros(len(times))], axis=1)[:, : len(parts)]
+            columns = [x[:, level] if x.ndim == 2 else np.linalg.norm(x[:, level], axis=-1) for x in arrays]
+            return np.stack([*columns, np.zeros(len(times))], axis=1)[:, : len(columns)]
 
         values = np.concatenate(
             [
@@ -187,15 +187,15 @@ class MechanismQuantities:
 
     def _inertial(self, grid: _Points) -> "_Table":
         """Return the table of m, c and their derivatives along the path: the inertial part of the driver forces."""
-        empty = dataclasses.replace(self.mechanism, forces={}, gravity=None, outputs={})
+        unloaded = dataclasses.replace(self.mechanism, forces={}, gravity=None, outputs={})
         start, length = self.path.start, self.path.stop - self.path.start
         even = ExpressionMotion("start + t*1", {"start": start})
-        c, c1 = self._forces(even, grid - start, empty)
+        c, c1 = self._forces(even, grid - start, unloaded)
         slope = 1 / length  # the rate of s grows from 1/2, and its square linearly in s
         grown = ExpressionMotion("start + t/2 + slope*t**2/2", {"start": start, "slope": slope})
         square = (0.25 + 2 * slope * (grid - start))[:, None]
         times = (np.sqrt(square[:, 0]) - 0.5) / slope
-        force, rate = self._forces(grown, times, empty)
+        force, rate = self._forces(grown, times, unloaded)
         m = (force - c * square) / slope
         w = np.sqrt(square)
         m1 = (rate - c1 * w**3) / (w * slope) - 2 * c
@@ -203,8 +203,8 @@ class MechanismQuantities:
 
     def _forces(self, progress: AbstractMotion, times: _Points, mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
         """Return the forces of drivers with force limits, and their rates."""
-        bare = dataclasses.replace(mechanism, outputs={})
-        motion: Motion = solve(_following(bare, self.laws, progress), times, ORDER)
+        reduced = dataclasses.replace(mechanism, outputs={})
+        motion: Motion = solve(_following(reduced, self.laws, progress), times, ORDER)
         forces = [np.asarray(driver_force(motion, name).values) for name in self.loaded]
         return np.stack([x[:, 0] for x in forces], axis=1), np.stack([x[:, 1] for x in forces], axis=1)
 
@@ -212,8 +212,8 @@ class MechanismQuantities:
         return name in self.limits and any(getattr(self.limits[name], field) is not None for field in fields)
 
     def _bounds(self, names: Sequence[str], field: str, s: _Points) -> Float[np.ndarray, "point name"]:
-        given = [getattr(self.limits[name], field) if name in self.limits else None for name in names]
-        return np.tile([np.inf if x is None else x for x in given], (len(s), 1)).astype(float).reshape(len(s), -1)
+        bounds = [getattr(self.limits[name], field) if name in self.limits else None for name in names]
+        return np.tile([np.inf if x is None else x for x in bounds], (len(s), 1)).astype(float).reshape(len(s), -1)
 
     def _labels(self) -> Labels:
         def turns(name: str) -> bool:
@@ -221,11 +221,11 @@ class MechanismQuantities:
                 return is_turning(self.mechanism.drivers[name])
             return str(getattr(self.mechanism.outputs[name], "unit", "m")).startswith("rad")
 
-        def label(name: str, word: str) -> Quantity:
-            force = word in ("force", "force rate")
-            turning = turns(name)
-            quantity = word.replace("force", "torque") if force and turning else word
-            return Quantity(name, quantity, (TURN if turning else SLIDE)[quantity])
+        def label(name: str, quantity_name: str) -> Quantity:
+            force = quantity_name in ("force", "force rate")
+            is_angle = turns(name)
+            quantity = quantity_name.replace("force", "torque") if force and is_angle else quantity_name
+            return Quantity(name, quantity, (TURN if is_angle else SLIDE)[quantity])
 
         first = [*(label(x, "velocity") for x in self.numbers), *(Quantity(x, "speed", "m/s") for x in self.vector)]
         second = [*(label(x, "acceleration") for x in self.numbers), *(label(x, "force") for x in self.loaded)]

@@ -71,20 +71,20 @@ def check_motion(
         name: Limits(**{field: getattr(given.joints[name], field, None) for field in given.own(name) - {"jounce"}})
         for name in robot.joint_names
     }
-    others = dataclasses.replace(given, joints=joints)
-    if not (others.jounce or others.varying or others.points or others.backward):
+    remaining = dataclasses.replace(given, joints=joints)
+    if not (remaining.jounce or remaining.varying or remaining.points or remaining.backward):
         return report
     source = RobotQuantities(
         robot,
         Path(dict(trajectory.laws), trajectory.start, trajectory.stop),
-        others,
+        remaining,
         drives=drives,
         loads=loads,
     )
-    extra = _rows(source, trajectory, infinite)
-    listed = {(row.joint, row.quantity) for row in extra}
+    added = _rows(source, trajectory, infinite)
+    listed = {(row.joint, row.quantity) for row in added}
     rows = tuple(row for row in report.rows if (row.joint, row.quantity) not in listed)
-    return dataclasses.replace(report, rows=(*rows, *extra), ends=_ends(source, trajectory, report.ends, drives=drives))
+    return dataclasses.replace(report, rows=(*rows, *added), ends=_ends(source, trajectory, report.ends, drives=drives))
 
 
 def _ends(
@@ -99,7 +99,7 @@ def _ends(
     signs = infinite_quantities(followed, jumps, drives).signs
     selected = []
     for k, end in enumerate(ends):
-        more = [
+        broken = [
             (name, word_of(robot.joints[name], quantity)[0])
             for joint, name in enumerate(robot.joint_names)
             for quantity, field in enumerate(FIELDS)
@@ -112,7 +112,7 @@ def _ends(
             for p in points
             if p.acceleration and source.point(state, p)[:, 1].any()
         ]
-        selected.append(dataclasses.replace(end, breaks=(*end.breaks, *more, *fourth, *forced)))
+        selected.append(dataclasses.replace(end, breaks=(*end.breaks, *broken, *fourth, *forced)))
     return tuple(selected)
 
 
@@ -134,26 +134,29 @@ def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infin
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
         peak_ratios = ratios(grid)
-        used = peak_ratios.max(axis=0) > 0
-        best, times = peak_ratios.max(axis=0), grid[np.argmax(peak_ratios, axis=0)]
-        for at in local_maxima(peak_ratios):
-            low, high = grid[np.maximum(at - 1, 0)], grid[np.minimum(at + 1, len(grid) - 1)]
-            every = np.arange(peak_ratios.shape[1])
+        is_limited = peak_ratios.max(axis=0) > 0
+        peaks, times = peak_ratios.max(axis=0), grid[np.argmax(peak_ratios, axis=0)]
+        for indices in local_maxima(peak_ratios):
+            low, high = grid[np.maximum(indices - 1, 0)], grid[np.minimum(indices + 1, len(grid) - 1)]
+            columns = np.arange(peak_ratios.shape[1])
             for _ in range(ZOOMS):
-                around = low + np.linspace(0, 1, ZOOM)[:, None] * (high - low)
-                here = ratios(around.reshape(-1)).reshape(*around.shape, -1)[:, every, every]
-                top = np.argmax(here, axis=0)
-                better = here[top, every] > best * (1 + 1e-12)
-                best, times = np.where(better, here[top, every], best), np.where(better, around[top, every], times)
-                low, high = around[np.maximum(top - 1, 0), every], around[np.minimum(top + 1, ZOOM - 1), every]
+                trials = low + np.linspace(0, 1, ZOOM)[:, None] * (high - low)
+                results = ratios(trials.reshape(-1)).reshape(*trials.shape, -1)[:, columns, columns]
+                top = np.argmax(results, axis=0)
+                better = results[top, columns] > peaks * (1 + 1e-12)
+                peaks, times = (
+                    np.where(better, results[top, columns], peaks),
+                    np.where(better, trials[top, columns], times),
+                )
+                low, high = trials[np.maximum(top - 1, 0), columns], trials[np.minimum(top + 1, ZOOM - 1), columns]
     values, bounds = _at_peaks(source, times)
     times = at_breaks(times, breaks, *ends)
     labels = source.labels.every
-    when = np.array([infinite.get((label.owner, label.word), np.nan) for label in labels])
-    when = np.where(np.isnan(when), _jumps(source, trajectory), when)
-    jumped = np.isfinite(when)
-    times, bounds = np.where(jumped, when, times), np.where(jumped, np.abs(bounds), bounds)
-    values, best = (np.where(jumped, np.inf, x) for x in (values, best))
+    infinite_times = np.array([infinite.get((label.owner, label.word), np.nan) for label in labels])
+    infinite_times = np.where(np.isnan(infinite_times), _jumps(source, trajectory), infinite_times)
+    jumped = np.isfinite(infinite_times)
+    times, bounds = np.where(jumped, infinite_times, times), np.where(jumped, np.abs(bounds), bounds)
+    values, peaks = (np.where(jumped, np.inf, x) for x in (values, peaks))
     return [
         LimitRow(
             labels[k].owner,
@@ -162,9 +165,9 @@ def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infin
             float(values[k]),
             float(times[k]),
             float(bounds[k]),
-            float(best[k]),
+            float(peaks[k]),
         )
-        for k in np.flatnonzero(used | jumped)
+        for k in np.flatnonzero(is_limited | jumped)
         if np.isfinite(bounds[k])
     ]
 
@@ -172,29 +175,29 @@ def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infin
 def _jumps(source: RobotQuantities, trajectory: JointTrajectory) -> np.ndarray:
     """Return the first times of infinite jounce, and infinite speeds and accelerations of points, or NaN."""
     labels, points = source.labels, source.limits.points
-    when = np.full(len(labels.every), np.nan)
+    times = np.full(len(labels.every), np.nan)
     if not (points or source.with_jounce):
-        return when
+        return times
     followed = FollowedTrajectory(source.robot, trajectory, given=False)
     grid = np.linspace(trajectory.start, trajectory.stop, 2001)
     jumps = jumps_of(followed, grid, followed.coordinates(grid, 4))
     if not len(jumps.times):
-        return when
+        return times
     changes = [np.abs(source.point(jumps.after, p) - source.point(jumps.before, p))[:, :2].max(axis=-1) for p in points]
     sizes = [np.abs(source.point(jumps.after, p))[:, :2].max(axis=-1) for p in points]
-    moved = [change > SMALL * (size + change) for change, size in zip(changes, sizes, strict=True)]
-    fast = [x[:, 0] for x, p in zip(moved, points, strict=True) if p.speed is not None]
-    forced = [x.any(axis=1) for x, p in zip(moved, points, strict=True) if p.acceleration is not None]
+    has_jumped = [change > SMALL * (size + change) for change, size in zip(changes, sizes, strict=True)]
+    fast = [x[:, 0] for x, p in zip(has_jumped, points, strict=True) if p.speed is not None]
+    forced = [x.any(axis=1) for x, p in zip(has_jumped, points, strict=True) if p.acceleration is not None]
     fourth = [x != 0 for x in jumps.above(4)[:, source.with_jounce].T]
-    for quantity_index, last in ((fast, len(labels.first)), (fourth, len(labels.every))):
-        when[last - len(quantity_index) : last] = [_first(jumps.times, x) for x in quantity_index]
-    last = len(labels.every) - len(labels.fourth)
-    when[last - len(forced) : last] = [_first(jumps.times, x) for x in forced]
-    return when
+    for quantity_index, stop in ((fast, len(labels.first)), (fourth, len(labels.every))):
+        times[stop - len(quantity_index) : stop] = [_first(jumps.times, x) for x in quantity_index]
+    stop = len(labels.every) - len(labels.fourth)
+    times[stop - len(forced) : stop] = [_first(jumps.times, x) for x in forced]
+    return times
 
 
-def _first(times: np.ndarray, some: np.ndarray) -> float:
-    return float(times[np.argmax(some)]) if some.any() else np.nan
+def _first(times: np.ndarray, mask: np.ndarray) -> float:
+    return float(times[np.argmax(mask)]) if mask.any() else np.nan
 
 
 def _curves(source: RobotQuantities, times: np.ndarray) -> Curves:
@@ -206,8 +209,8 @@ def _curves(source: RobotQuantities, times: np.ndarray) -> Curves:
 def _at_peaks(source: RobotQuantities, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the value of each curve at its own instant, and its bound with the sign of the value."""
     curves = _curves(source, times)
-    parts = curves.values(np.tile(EVEN[:, None], len(times)))
-    values, (_, second, rates, *_), q = np.concatenate(parts, axis=1), parts, curves.quantities
+    arrays = curves.values(np.tile(EVEN[:, None], len(times)))
+    values, (_, second, rates, *_), q = np.concatenate(arrays, axis=1), arrays, curves.quantities
     side = np.where(second / q.upper >= second / q.lower, q.upper, -q.lower)
     rates = np.where(rates >= 0, q.rate_upper, -q.rate_lower)
     bounds = np.concatenate([q.first_bounds, side, rates, q.vector_bounds, q.fourth_bounds], axis=1)

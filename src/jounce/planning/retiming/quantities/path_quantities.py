@@ -136,10 +136,10 @@ class Curves:
         """Return values for z and its derivatives, (4, point): first, second, rates, magnitudes of vectors, fourth."""
         z, z1, z2, z3 = (x[:, None] for x in law)
         w = np.sqrt(z)
-        half, square, single, constant = self.value
-        second = half * z1 / 2 + square * z + single * w + constant
-        top, slope, square, constant, single_half, single = self.rate
-        rates = w * (top * z2 / 2 + slope * z1 / 2 + square * z + constant) + single_half * z1 / 2 + single * z
+        half, square, linear, constant = self.value
+        second = half * z1 / 2 + square * z + linear * w + constant
+        top, slope, square, constant, single_half, linear = self.rate
+        rates = w * (top * z2 / 2 + slope * z1 / 2 + square * z + constant) + single_half * z1 / 2 + linear * z
         half, square = self.vector
         vectors = np.linalg.norm(half * z1[..., None] / 2 + square * z[..., None], axis=-1)
         a, b, c, d = self.fourth
@@ -195,34 +195,34 @@ class Curves:
         z, z1, z2, _ = (x[:, None] for x in law)
         w = np.sqrt(z)
         zero = np.zeros_like(self.speed)
-        made = [((self.speed / q.first_bounds) ** 2, zero, zero, zero, np.ones_like(zero))]
-        half, square, single, constant = self.value
-        none = np.zeros_like(half)
-        level = square + single / (2 * w)
+        blocks = [((self.speed / q.first_bounds) ** 2, zero, zero, zero, np.ones_like(zero))]
+        half, square, linear, constant = self.value
+        zeros = np.zeros_like(half)
+        level = square + linear / (2 * w)
         for sign, bound in ((1, q.upper), (-1, -q.lower)):
-            right = bound - sign * (constant + single * w / 2)
+            right = bound - sign * (constant + linear * w / 2)
             size = np.where(bound > 0, bound, 1.0)
-            made.append((sign * level / size, sign * half / 2 / size, none, none, right / size))
-        top, slope, square, constant, single_half, single = self.rate
+            blocks.append((sign * level / size, sign * half / 2 / size, zeros, zeros, right / size))
+        top, slope, square, constant, single_half, linear = self.rate
         # (single_half z' / 2 + single z) / sqrt(z), expanded
-        mixed = (single_half * -z1 / (4 * w**3) + single / (2 * w), single_half / (2 * w))
-        rest = single_half * z1 / (4 * w) + single * w / 2
+        mixed = (single_half * -z1 / (4 * w**3) + linear / (2 * w), single_half / (2 * w))
+        remainder = single_half * z1 / (4 * w) + linear * w / 2
         for sign, bound in ((1, q.rate_upper), (-1, -q.rate_lower)):
             size = bound / w
             slopes = (sign * (square + mixed[0]) / size + 1 / (2 * z), sign * (slope / 2 + mixed[1]) / size)
-            made.append((*slopes, sign * top / 2 / size, none, 1.5 - sign * (constant + rest) / size))
+            blocks.append((*slopes, sign * top / 2 / size, zeros, 1.5 - sign * (constant + remainder) / size))
         # outer + z' inner / (2 z) <= bound / z, with the second term on the left expanded
         a, b, c, d = self.fourth
-        inner, share = a * z2 / 2 + 1.5 * b * z1 + c * z, z1 / (2 * z)
-        mixed = (share * c - share * inner / z, inner / (2 * z) + share * 1.5 * b, share * a / 2)
-        rest = share * inner - sum(x * y for x, y in zip(mixed, (z, z1, z2), strict=True))
+        inner, ratio = a * z2 / 2 + 1.5 * b * z1 + c * z, z1 / (2 * z)
+        mixed = (ratio * c - ratio * inner / z, inner / (2 * z) + ratio * 1.5 * b, ratio * a / 2)
+        remainder = ratio * inner - sum(x * y for x, y in zip(mixed, (z, z1, z2), strict=True))
         size = eased * q.fourth_bounds / z
         for sign in (1, -1):
             slopes = (d + mixed[0], 2.5 * c + mixed[1], 2 * b + mixed[2], a / 2)
             slopes = (sign * slopes[0] / size + 1 / z, *(sign * x / size for x in slopes[1:]))
-            made.append((*slopes, 2 - sign * rest / size))
-        slopes = np.stack([np.concatenate([part[k] for part in made], axis=1) for k in range(4)])
-        right = np.concatenate([part[4] for part in made], axis=1)
+            blocks.append((*slopes, 2 - sign * remainder / size))
+        slopes = np.stack([np.concatenate([block[k] for block in blocks], axis=1) for k in range(4)])
+        right = np.concatenate([block[4] for block in blocks], axis=1)
         limits = (q.first_bounds, q.upper, q.lower, q.rate_upper, q.rate_lower, q.fourth_bounds, q.fourth_bounds)
         limited = np.isfinite(np.concatenate(limits, axis=1))
         slopes, right = np.where(limited, slopes, 0.0), np.where(limited, right, np.inf)

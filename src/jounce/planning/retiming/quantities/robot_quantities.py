@@ -127,22 +127,22 @@ class RobotQuantities:
         chosen = self.with_acceleration
         motion = q[:, :, chosen]
         nothing = np.zeros_like(motion[:, 0])
-        parts = (motion[:, 1], motion[:, 2], nothing, nothing, motion[:, 2], motion[:, 3], nothing, nothing)
-        at_rest = np.abs(motion[:, 1]) <= REST * np.abs(motion[:, 1]).max(axis=0, initial=0.0)
-        ahead, sides = motion[:, 1] > 0, []
+        coefficients = (motion[:, 1], motion[:, 2], nothing, nothing, motion[:, 2], motion[:, 3], nothing, nothing)
+        is_at_rest = np.abs(motion[:, 1]) <= REST * np.abs(motion[:, 1]).max(axis=0, initial=0.0)
+        is_positive, sides = motion[:, 1] > 0, []
         pairs = zip(self.both_ways("acceleration", chosen, q), self.both_ways("deceleration", chosen, q), strict=True)
-        for (faster, slower), along in zip(pairs, (ahead, ~ahead), strict=True):
+        for (faster, slower), is_along in zip(pairs, (is_positive, ~is_positive), strict=True):
             slowing = np.where(np.isfinite(slower), slower, faster)
             speeding = np.where(
-                at_rest & (s == self.path.stop)[:, None], slowing, faster
+                is_at_rest & (s == self.path.stop)[:, None], slowing, faster
             )  # the arriving motion slows down
-            sides.append(np.where(at_rest | along, speeding, slowing))
-        jerk, jerk_back = self.both_ways("jerk", chosen, q)
-        tables = [(np.stack(parts, axis=-1), -sides[1], sides[0], -jerk_back, jerk)]
+            sides.append(np.where(is_at_rest | is_along, speeding, slowing))
+        jerk, reverse_jerk = self.both_ways("jerk", chosen, q)
+        tables = [(np.stack(coefficients, axis=-1), -sides[1], sides[0], -reverse_jerk, jerk)]
         if self.with_effort:
-            effort, effort_back = self.both_ways("effort", self.with_effort, q)
-            rate, rate_back = self.both_ways("effort_rate", self.with_effort, q)
-            tables.append((self._torques(q, s)[:, self.with_effort], -effort_back, effort, -rate_back, rate))
+            effort, reverse_effort = self.both_ways("effort", self.with_effort, q)
+            rate, reverse_rate = self.both_ways("effort_rate", self.with_effort, q)
+            tables.append((self._torques(q, s)[:, self.with_effort], -reverse_effort, effort, -reverse_rate, rate))
         second, *bounds = (np.concatenate(x, axis=1) for x in zip(*tables, strict=True))
         lower, upper, rate_lower, rate_upper = bounds
         return second, lower, upper, rate_lower, rate_upper
@@ -152,9 +152,9 @@ class RobotQuantities:
         first, second = (x[:, None, None] for x in CASES.T)
         q = q[..., : len(self.robot.joint_names)]
         _, q1, q2, q3, _ = np.moveaxis(q, 1, 0)
-        at = np.broadcast_to(q[:, 0], (len(CASES), *q[:, 0].shape))
-        moving = (at, q1 * first, q1 * second + q2 * first**2, 3 * q2 * first * second + q3 * first**3)
-        torques = self.loaded.torques(np.stack(moving, axis=2), s, self.drives)
+        positions = np.broadcast_to(q[:, 0], (len(CASES), *q[:, 0].shape))
+        states = (positions, q1 * first, q1 * second + q2 * first**2, 3 * q2 * first * second + q3 * first**3)
+        torques = self.loaded.torques(np.stack(states, axis=2), s, self.drives)
         speeds = CASES[:3, 0]
         values, rates = np.moveaxis(torques, 2, 0)  # of cases, points, joints
         g, d, c = np.einsum("ij,jpn->ipn", np.linalg.inv(np.vander(speeds, increasing=True)), values[:3])
@@ -167,8 +167,8 @@ class RobotQuantities:
         chosen = [point for point in self.limits.points if point.acceleration is not None]
         if not chosen:
             return np.zeros((len(q), 0, 3, 2)), np.zeros((len(q), 0))
-        moved = [np.moveaxis(self.point(q, point)[:, 1:3], 1, -1) for point in chosen]
-        return np.stack(moved, axis=1), np.tile(np.array([point.acceleration for point in chosen], float), (len(q), 1))
+        curves = [np.moveaxis(self.point(q, point)[:, 1:3], 1, -1) for point in chosen]
+        return np.stack(curves, axis=1), np.tile(np.array([point.acceleration for point in chosen], float), (len(q), 1))
 
     def point(self, q: np.ndarray, point: object) -> Float[np.ndarray, "point 3 3"]:
         """Return the position of a point and two derivatives, for coordinates with derivatives."""
@@ -178,10 +178,10 @@ class RobotQuantities:
     def _has(self, name: str, *fields: str) -> bool:
         """Whether a joint has any of some limits."""
         constant, varying = self.own_limits[name], self.limits.varying.get(name, {})
-        others, backward = {"jounce": self.limits.jounce.get(name)}, self.limits.backward.get(name, Limits())
+        more_limits, backward = {"jounce": self.limits.jounce.get(name)}, self.limits.backward.get(name, Limits())
         return any(
             f in varying
-            or others.get(f, getattr(constant, f, None)) is not None
+            or more_limits.get(f, getattr(constant, f, None)) is not None
             or getattr(backward, f, None) is not None
             for f in fields
         )
@@ -227,10 +227,10 @@ class RobotQuantities:
         names = self.names
 
         def label(k: int, field: str) -> Quantity:
-            turning = self.robot.joints[names[k]].turning
-            units = (TURNING if turning else SLIDING) | {"jounce": "rad/s^4" if turning else "m/s^4"}
-            word = field.replace("effort", "torque" if turning else "force").replace("_", " ")
-            return Quantity(names[k], word, units[field])
+            turns = self.robot.joints[names[k]].turning
+            units = (TURNING if turns else SLIDING) | {"jounce": "rad/s^4" if turns else "m/s^4"}
+            quantity = field.replace("effort", "torque" if turns else "force").replace("_", " ")
+            return Quantity(names[k], quantity, units[field])
 
         points = self.limits.points
         first = [label(k, "velocity") for k in self.with_velocity]
@@ -250,14 +250,14 @@ class RobotQuantities:
         for column in self.moved:
             name = self.names[column]
             limits = self.own_limits[name]
-            for bound, sign, word in ((limits.upper, 1, "above"), (limits.lower, -1, "below")):
+            for bound, sign, side in ((limits.upper, 1, "above"), (limits.lower, -1, "below")):
                 if bound is None:
                     continue
-                over = sign * (q[:, column] - bound)
-                worst = int(np.argmax(over))
-                if over[worst] > 1e-9 * max(1.0, abs(bound)):
+                excess = sign * (q[:, column] - bound)
+                index = int(np.argmax(excess))
+                if excess[index] > 1e-9 * max(1.0, abs(bound)):
                     message = (
-                        f"the path leaves the range of this joint: {q[worst, column]:.6g} at s = {s[worst]:.6g} is "
-                        f"{word} {bound:g}; no time law changes that; choose another path"
+                        f"the path leaves the range of this joint: {q[index, column]:.6g} at s = {s[index]:.6g} is "
+                        f"{side} {bound:g}; no time law changes that; choose another path"
                     )
                     raise TrajectoryError(message, name=name)

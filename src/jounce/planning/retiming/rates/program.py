@@ -74,25 +74,25 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
     clarabel = cone_solver()
 
     wide = sparse.csc_matrix
-    about = program.about if program.duration is None and not elastic else None
-    count, nodes = program.nodes.shape[1], 0 if elastic or about is not None else len(program.weights)
-    extra = 1 if elastic else 2 * nodes
+    center = program.about if program.duration is None and not elastic else None
+    count, nodes = program.nodes.shape[1], 0 if elastic or center is not None else len(program.weights)
+    extra_count = 1 if elastic else 2 * nodes
     slowest, sums = program.duration is not None, np.zeros(count)
     if slowest:
         sums = program.nodes.T @ program.weights
     times = np.zeros(nodes) if slowest else program.weights
     objective = np.concatenate([0 * sums, np.ones(1)] if elastic else [sums, times[:nodes], np.zeros(nodes)])
-    quadratic = wide((count + extra, count + extra))
-    if about is not None:
-        curved = program.weights * about**-2.5
+    quadratic = wide((count + extra_count, count + extra_count))
+    if center is not None:
+        curved = program.weights * center**-2.5
         quadratic = wide(sparse.triu(program.nodes.T @ sparse.diags(0.75 * curved) @ program.nodes))
-        objective = program.nodes.T @ (-1.25 * curved * about)
+        objective = program.nodes.T @ (-1.25 * curved * center)
 
     def widened(matrix: Any, unknowns: Any = None) -> Any:
         """Return a matrix over the coefficients with columns for the other unknowns, zero unless given."""
-        if not extra:
+        if not extra_count:
             return matrix
-        return sparse.hstack([matrix, wide((matrix.shape[0], extra)) if unknowns is None else unknowns])
+        return sparse.hstack([matrix, wide((matrix.shape[0], extra_count)) if unknowns is None else unknowns])
 
     blocks: list[Any] = [widened(program.equal)]
     sides: list[Any] = [program.equal_right]
@@ -112,23 +112,23 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
     if len(program.radii):
         cone = program.cones.tocoo()
         row = cone.row + cone.row // 3 + 1  # the first of the four rows of a cone is the radius
-        shape = (4 * len(program.radii), count + extra)
+        shape = (4 * len(program.radii), count + extra_count)
         blocks.append(sparse.coo_matrix((-cone.data, (row, cone.col)), shape=shape))
         sides.append(np.column_stack([program.radii, np.zeros((len(program.radii), 3))]).reshape(-1))
         kinds += [clarabel.SecondOrderConeT(4)] * len(program.radii)
     if nodes:
         # y^2 <= z and 1 <= r y, so that r >= 1 / sqrt(z), as the cones
         # ((z + 1) / 2, (z - 1) / 2, y) and ((r + y) / 2, (r - y) / 2, 1)
-        z, one = program.nodes.tocoo(), np.arange(nodes)
+        z, numbers = program.nodes.tocoo(), np.arange(nodes)
         half = np.full(nodes, 0.5)
-        parts = (
+        entries = (
             (z.row * 6, z.col, z.data / 2), (z.row * 6 + 1, z.col, z.data / 2),
-            (one * 6 + 2, count + nodes + one, 2 * half),
-            (one * 6 + 3, count + one, half), (one * 6 + 3, count + nodes + one, half),
-            (one * 6 + 4, count + one, half), (one * 6 + 4, count + nodes + one, -half),
+            (numbers * 6 + 2, count + nodes + numbers, 2 * half),
+            (numbers * 6 + 3, count + numbers, half), (numbers * 6 + 3, count + nodes + numbers, half),
+            (numbers * 6 + 4, count + numbers, half), (numbers * 6 + 4, count + nodes + numbers, -half),
         )  # fmt: skip
-        row, column, data = (np.concatenate(x) for x in zip(*parts, strict=True))
-        blocks.append(sparse.coo_matrix((-data, (row, column)), shape=(6 * nodes, count + extra)))
+        row, column, data = (np.concatenate(x) for x in zip(*entries, strict=True))
+        blocks.append(sparse.coo_matrix((-data, (row, column)), shape=(6 * nodes, count + extra_count)))
         sides.append(np.tile([0.5, -0.5, 0.0, 0.0, 0.0, 1.0], nodes))
         kinds += [clarabel.SecondOrderConeT(3)] * (2 * nodes)
     settings = clarabel.DefaultSettings()
@@ -137,8 +137,8 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
     matrix = wide(sparse.vstack(blocks, format="csc"))
     solver = clarabel.DefaultSolver(quadratic, objective, matrix, np.concatenate(sides), kinds, settings)
     solution = solver.solve()
-    begin = len(program.equal_right)
-    prices = np.array(solution.z)[begin : begin + len(program.right)]
+    start = len(program.equal_right)
+    prices = np.array(solution.z)[start : start + len(program.right)]
     usable = str(solution.status) in ("Solved", "AlmostSolved")
     x = np.array(solution.x)
     return Solution(x[:count] if usable else None, prices, float(x[-1]) if elastic else 0.0)

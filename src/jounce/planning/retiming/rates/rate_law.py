@@ -82,6 +82,6 @@ def progress(law: RateLaw) -> tuple[_Points, _Points]:
     """Return the share of the duration, and s, at the knots of a law."""
     nodes, weights = quadrature(law.basis.cells, 8)
     times = (weights / np.sqrt(law.at(nodes)[0])).reshape(law.basis.cells, -1).sum(axis=1)
-    share = np.append(0.0, np.cumsum(times))
+    u = np.append(0.0, np.cumsum(times))
     s = law.parameter.derivatives(np.linspace(0, 1, law.basis.cells + 1), 0)[0]
-    return share / share[-1], s
+    return u / u[-1], s

@@ -77,19 +77,19 @@ class RateMotion(AbstractMotion):
 
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of u at the instants of the time jet; NaN outside."""
-        at, order = time.coefficients[0], time.order
+        instant, order = time.coefficients[0], time.order
         instants, begins, pieces = map(jnp.asarray, (self.instants, self.begins, self.pieces))
         if instants.ndim == 1:
-            series = _series(instants, begins, pieces, at, order)
+            series = _series(instants, begins, pieces, instant, order)
         else:  # several laws of one kind, stacked along an axis before the batch: (pieces, laws, 1)
-            shared = jnp.broadcast_to(at, (instants.shape[1], at.shape[-1]))
+            shared_instants = jnp.broadcast_to(instant, (instants.shape[1], instant.shape[-1]))
             stacked = jax.vmap(_series, in_axes=(1, 1, 2, 0, None), out_axes=0)
-            series = stacked(instants[..., 0], begins[..., 0], pieces[..., 0], shared, order)
+            series = stacked(instants[..., 0], begins[..., 0], pieces[..., 0], shared_instants, order)
         rates = time.coefficients[1:]
         if all(c is None for c in rates[1:]):  # time at a constant rate
             rate = 1.0 if not rates else 0.0 if rates[0] is None else rates[0]
             return Jet(a * rate**k for k, a in enumerate(series))
-        local = Jet((jnp.zeros_like(at), *rates))
+        local = Jet((jnp.zeros_like(instant), *rates))
         value = Jet.constant(series[-1], order)
         for a in series[-2::-1]:
             value = value * local + a
@@ -97,13 +97,13 @@ class RateMotion(AbstractMotion):
 
 
 @partial(jax.jit, static_argnames="order")  # otherwise each call would compile the loop
-def _series(instants: Any, begins: Any, pieces: Any, at: Any, order: int) -> tuple[Any, ...]:
+def _series(instants: Any, begins: Any, pieces: Any, instant: Any, order: int) -> tuple[Any, ...]:
     """Return the Taylor coefficients of u at instants."""
     slack = SLACK * instants[-1]
-    inside = jnp.clip(at, 0.0, instants[-1])
-    piece = last_begun(instants[:-1], inside)
-    c, begin = pieces[:, piece], begins[piece]
-    length, elapsed = begins[piece + 1] - begin, inside - instants[piece]
+    clipped = jnp.clip(instant, 0.0, instants[-1])
+    index = last_begun(instants[:-1], clipped)
+    c, start = pieces[:, index], begins[index]
+    length, elapsed = begins[index + 1] - start, clipped - instants[index]
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
 
     def step(_: int, v: Any) -> Any:
@@ -111,9 +111,9 @@ def _series(instants: Any, begins: Any, pieces: Any, at: Any, order: int) -> tup
         time = v / 2 * jnp.tensordot(weights, 1 / jnp.sqrt(_value(c[:, None], points)), axes=1)
         return jnp.clip(v + (elapsed - time) * jnp.sqrt(_value(c, v)), 0.0, length)
 
-    v = jax.lax.fori_loop(0, NEWTON, step, length * elapsed / (instants[piece + 1] - instants[piece]))
+    v = jax.lax.fori_loop(0, NEWTON, step, length * elapsed / (instants[index + 1] - instants[index]))
     shifted = _shifted(c, v)
-    series = [begin + v]
+    series = [start + v]
     if order:
         series.append(jnp.sqrt(shifted[0]))
     # coefficients of the powers of u - u(t), which follow one after the other like those of u
@@ -126,8 +126,8 @@ def _series(instants: Any, begins: Any, pieces: Any, at: Any, order: int) -> tup
                 powers[m].append(sum((series[i] * powers[m - 1][k - i] for i in range(1, k)), jnp.zeros_like(v)))
             slope = sum((j * shifted[j] * powers[j - 2][k] for j in range(2, len(shifted))), slope)
         series.append(slope / (2 * (k + 1) * (k + 2)))
-    outside = (at < -slack) | (at > instants[-1] + slack)
-    return tuple(jnp.where(outside, jnp.nan, a) for a in series)
+    is_outside = (instant < -slack) | (instant > instants[-1] + slack)
+    return tuple(jnp.where(is_outside, jnp.nan, a) for a in series)
 
 
 def _value(coefficients: Any, v: Any) -> Any:
@@ -147,23 +147,23 @@ def _shifted(coefficients: Any, v: Any) -> list[Any]:
 
 
 def _times(
-    pieces: Float[np.ndarray, "powers piece"], lengths: Float[np.ndarray, " piece"], parts: int = 1
+    pieces: Float[np.ndarray, "powers piece"], lengths: Float[np.ndarray, " piece"], count: int = 1
 ) -> Float[np.ndarray, " piece"]:
     """Return the time over each piece."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    points = (np.arange(parts)[:, None] + (nodes + 1) / 2).reshape(-1, 1) / parts * lengths
+    points = (np.arange(count)[:, None] + (nodes + 1) / 2).reshape(-1, 1) / count * lengths
     z = _value(pieces, points)
     if not (z > 0).all():
         raise TrajectoryError("the square of a rate must be positive", value=float(z.min()))
-    return np.tile(weights, parts) @ (1 / np.sqrt(z)) * lengths / 2 / parts
+    return np.tile(weights, count) @ (1 / np.sqrt(z)) * lengths / 2 / count
 
 
 def _halved(begins: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the pieces, halved where the quadrature is not exact to rounding."""
     for _ in range(HALVINGS):
         lengths = np.diff(begins)
-        whole, halves = _times(pieces, lengths), _times(pieces, lengths, 2)
-        coarse = np.abs(whole - halves) > EXACT * halves
+        times, halves = _times(pieces, lengths), _times(pieces, lengths, 2)
+        coarse = np.abs(times - halves) > EXACT * halves
         if not coarse.any():
             break
         ends = begins[-1]

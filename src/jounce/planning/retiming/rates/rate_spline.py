@@ -40,19 +40,19 @@ class Parametrization(SplineMotion):
         greville = np.array([knots[k + 1 : k + 1 + SMOOTHNESS].mean() for k in range(count)])
         # a spline with increasing coefficients increases; k equal coefficients at an end make k - 1 derivatives vanish
         values = np.interp(greville, u, s)
-        for end, resting in zip((slice(None), slice(None, None, -1)), rests, strict=True):
-            values[end][: max(resting, 1)] = s[end][0]
+        for end, fixed_levels in zip((slice(None), slice(None, None, -1)), rests, strict=True):
+            values[end][: max(fixed_levels, 1)] = s[end][0]
         spline = BSpline(knots, values, SMOOTHNESS)
-        pieces = np.linspace(0.0, 1.0, KNOT_INTERVALS + 1)
-        self._set(pieces[:-1], local_powers(spline, pieces[:-1], SMOOTHNESS), 1.0, "continue")
+        breakpoints = np.linspace(0.0, 1.0, KNOT_INTERVALS + 1)
+        self._set(breakpoints[:-1], local_powers(spline, breakpoints[:-1], SMOOTHNESS), 1.0, "continue")
 
     def derivatives(self, u: _Points, order: int) -> Float[np.ndarray, "derivative point"]:
         """Return s and its derivatives by u."""
         begins, powers = np.asarray(self.breakpoints), np.asarray(self.coefficients)
-        piece = np.clip(np.searchsorted(begins, u, side="right") - 1, 0, None)
-        local, own = u - begins[piece], powers[:, piece]
+        index = np.clip(np.searchsorted(begins, u, side="right") - 1, 0, None)
+        local, piece_powers = u - begins[index], powers[:, index]
         return np.stack(
-            [np.polynomial.polynomial.polyval(local, _derived(own, k), tensor=False) for k in range(order + 1)]
+            [np.polynomial.polynomial.polyval(local, _derived(piece_powers, k), tensor=False) for k in range(order + 1)]
         )
 
 
@@ -102,16 +102,16 @@ class RateBasis:
             if degree < 0:
                 matrices.append(sparse.csr_matrix((len(u), self.count)))
                 continue
-            own = knots[level : len(knots) - level]
-            design: Any = BSpline.design_matrix(u, own, degree)
+            inner_knots = knots[level : len(knots) - level]
+            design: Any = BSpline.design_matrix(u, inner_knots, degree)
             matrices.append((design @ change).tocsr())
             if degree:
-                widths = own[degree + 1 : -1] - own[1 : len(own) - degree - 1]
+                widths = inner_knots[degree + 1 : -1] - inner_knots[1 : len(inner_knots) - degree - 1]
                 rows = len(widths)
-                down, up = (
+                lower, upper = (
                     sparse.diags(sign * degree / widths, k, shape=(rows, rows + 1)) for k, sign in ((0, -1), (1, 1))
                 )
-                step: Any = down + up
+                step: Any = lower + upper
                 change = step @ change
         return matrices
 
