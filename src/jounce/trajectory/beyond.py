@@ -12,7 +12,7 @@ SLACK = 1e-9  # of the duration, by which rounding may move an instant out of a 
 CLOSED = 1e-9  # of the range of a law, within which it ends at its initial value
 
 
-def check_within(first: float, last: float, start: float, stop: float, of: str) -> None:
+def check_within(first: float, last: float, start: float, stop: float, subject: str) -> None:
     """Raise MechanismError if instants from `first` to `last` are not all within a law with ends.
 
     Parameters
@@ -21,14 +21,14 @@ def check_within(first: float, last: float, start: float, stop: float, of: str) 
         First and last requested instant, s.
     start, stop : float
         Ends of the law.
-    of : str
+    subject : str
         What determines the law, in the plural, for the message.
     """
     slack = SLACK * (stop - start)
     if first < start - slack or last > stop + slack:
         instant = last if last > stop + slack else first
         message = (
-            f"the {of} go from {start:.9g} to {stop:.9g} s, and the law is not defined beyond them"
+            f"the {subject} go from {start:.9g} to {stop:.9g} s, and the law is not defined beyond them"
             "; stay within them, or choose beyond: hold, repeat or advance"
         )
         raise MechanismError(message, value=float(instant))
@@ -57,8 +57,8 @@ def continued(within: Callable[[Jet], Jet], time: Jet, start: Any, stop: Any, be
         periods = jnp.floor((instants - start) / length)
         return within(time - periods * length) + periods * jnp.asarray(advance)
     slack = SLACK * length
-    outside = (instants < start - slack) | (instants > stop + slack)
+    is_outside = (instants < start - slack) | (instants > stop + slack)
     if beyond == "refuse":
-        return within(time).dense().map(lambda c: jnp.where(outside, jnp.nan, c))
-    held = [jnp.clip(instants, start, stop), *(jnp.zeros_like(instants),) * time.order]
-    return within(Jet(jnp.where(outside, h, c) for h, c in zip(held, time.dense().coefficients, strict=True)))
+        return within(time).dense().map(lambda c: jnp.where(is_outside, jnp.nan, c))
+    clipped = [jnp.clip(instants, start, stop), *(jnp.zeros_like(instants),) * time.order]
+    return within(Jet(jnp.where(is_outside, h, c) for h, c in zip(clipped, time.dense().coefficients, strict=True)))

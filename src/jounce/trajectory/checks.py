@@ -57,10 +57,10 @@ def check_samples(
     if len(times) < 2:
         raise error("at least two samples are needed", value=len(times))
     for name, entries in (("times", times), ("values", values)):
-        bad = np.argwhere(~np.isfinite(entries))
-        if len(bad):
-            index = "".join(f"[{k}]" for k in bad[0])
-            raise error("samples must be finite", name=f"{name}{index}", value=float(entries[tuple(bad[0])]))
+        failures = np.argwhere(~np.isfinite(entries))
+        if len(failures):
+            index = "".join(f"[{k}]" for k in failures[0])
+            raise error("samples must be finite", name=f"{name}{index}", value=float(entries[tuple(failures[0])]))
     steps = np.diff(times)
     if (steps <= 0).any():
         first = int(np.argmax(steps <= 0))
@@ -76,6 +76,6 @@ def names_of_joints(names: Iterable[str]) -> tuple[str, ...]:
     if not result or not all(isinstance(name, str) for name in result):
         raise TrajectoryError("names of joints are needed, as a list of text", name="names", value=list(result))
     if len(set(result)) < len(result):
-        twice = next(name for k, name in enumerate(result) if name in result[:k])
-        raise TrajectoryError("a joint is named twice", name="names", value=twice)
+        repeated = next(name for k, name in enumerate(result) if name in result[:k])
+        raise TrajectoryError("a joint is named twice", name="names", value=repeated)
     return result

@@ -34,9 +34,9 @@ _FUNCTION = re.compile(r"([A-Za-z_]\w*)\s*\(")
 def refuses_without_ends(formulas: Sequence[Any]) -> str:
     """Return the function in the expressions of a curve that requires a range, as it is not smooth; empty if none."""
     texts = [f.expression.text for f in formulas]
-    words = {word for text in texts for word in _FUNCTION.findall(text)} - SMOOTH
-    if words:
-        return min(words)
+    functions = {function for text in texts for function in _FUNCTION.findall(text)} - SMOOTH
+    if functions:
+        return min(functions)
     return "a power" if any(len(_POWER.findall(text)) < text.count("**") for text in texts) else ""
 
 
@@ -55,36 +55,36 @@ def check_curve(formulas: Sequence[Any], window: Sequence[float], *, stated: boo
         Whether the curve is closed.
     """
 
-    def at(parameters: Parameters) -> Values:
+    def evaluate(parameters: Parameters) -> Values:
         return derivatives_at(formulas, parameters)
 
     low, high = window
     parameters = np.linspace(low, high, SAMPLES)
-    values = at(parameters)
+    values = evaluate(parameters)
     finite = np.isfinite(values[:2]).all(axis=(0, 1))
     if stated and not finite.all():
-        where = float(parameters[np.argmin(finite)])
-        raise MechanismError(f"the curve or its tangent is not finite at s = {where:.6g}; state a range where they are")
+        s = float(parameters[np.argmin(finite)])
+        raise MechanismError(f"the curve or its tangent is not finite at s = {s:.6g}; state a range where they are")
     defined = np.where(finite)[0]
     if not defined.size:
         return
-    _check_cusps(at, parameters[defined], values[:, :, defined])
+    _check_cusps(evaluate, parameters[defined], values[:, :, defined])
     if any(_may_break(f.expression.text) for f in formulas):
-        _check_jumps(at, parameters, values)
+        _check_jumps(evaluate, parameters, values)
     if closed:
-        _check_seam(at, low, high, values)
+        _check_seam(evaluate, low, high, values)
 
 
-def derivatives_at(formulas: Sequence[Any], parameters: Parameters, *others: Parameters) -> Values:
+def derivatives_at(formulas: Sequence[Any], parameters: Parameters, *fixed_parameters: Parameters) -> Values:
     """Return coordinates of a curve, or of a surface along its first parameter, and their derivatives by it."""
     derivatives = []
     for first in range(0, len(parameters), LANES):
-        given = [np.resize(x[first : first + LANES], LANES) for x in (parameters, *others)]
-        moved, *still = (jnp.asarray(x) for x in given)
-        jets = [Jet.variable(moved, LEVELS), *(Jet.constant(x, LEVELS) for x in still)]
+        arguments = [np.resize(x[first : first + LANES], LANES) for x in (parameters, *fixed_parameters)]
+        varied, *constants = (jnp.asarray(x) for x in arguments)
+        jets = [Jet.variable(varied, LEVELS), *(Jet.constant(x, LEVELS) for x in constants)]
         count = len(parameters[first : first + LANES])
-        parts = [np.stack([np.asarray(c) for c in f(*jets).dense().derivatives()]) for f in formulas]
-        derivatives.append(np.stack(parts, axis=1)[..., :count])
+        coordinates = [np.stack([np.asarray(c) for c in f(*jets).dense().derivatives()]) for f in formulas]
+        derivatives.append(np.stack(coordinates, axis=1)[..., :count])
     return np.concatenate(derivatives, axis=-1)
 
 
@@ -93,31 +93,31 @@ def _may_break(text: str) -> bool:
     return "/" in text or "**" in text or not set(_FUNCTION.findall(text)) <= SMOOTH - {"tan"}
 
 
-def _check_cusps(at: Callable[[Parameters], Values], parameters: Parameters, values: Values) -> None:
+def _check_cusps(evaluate: Callable[[Parameters], Values], parameters: Parameters, values: Values) -> None:
     speed = np.linalg.norm(values[1], axis=0)
     usual = float(np.median(speed))
     if usual == 0:
         raise MechanismError("the curve is a single point: its tangent vanishes everywhere")
     before, after = np.append(np.inf, speed[:-1]), np.append(speed[1:], np.inf)
-    least = np.flatnonzero((speed <= before) & (speed <= after) & (speed < SLOW * usual))
-    if not least.size:
+    minima = np.flatnonzero((speed <= before) & (speed <= after) & (speed < SLOW * usual))
+    if not minima.size:
         return
-    low, high = parameters[np.maximum(least - 1, 0)], parameters[np.minimum(least + 1, len(parameters) - 1)]
+    low, high = parameters[np.maximum(minima - 1, 0)], parameters[np.minimum(minima + 1, len(parameters) - 1)]
     for _ in range(NARROWINGS):  # ternary search for the shortest tangent
-        near, far = low + (high - low) / 3, high - (high - low) / 3
-        sizes = np.split(np.linalg.norm(at(np.concatenate([near, far]))[1], axis=0), 2)
+        lower, upper = low + (high - low) / 3, high - (high - low) / 3
+        sizes = np.split(np.linalg.norm(evaluate(np.concatenate([lower, upper]))[1], axis=0), 2)
         nearer = sizes[0] < sizes[1]
-        low, high = np.where(nearer, low, near), np.where(nearer, far, high)
+        low, high = np.where(nearer, low, lower), np.where(nearer, upper, high)
     middle = 0.5 * (low + high)
-    candidates = np.concatenate([middle, parameters[least]])
-    sizes = np.linalg.norm(at(candidates)[1], axis=0)
+    candidates = np.concatenate([middle, parameters[minima]])
+    sizes = np.linalg.norm(evaluate(candidates)[1], axis=0)
     if sizes.min() < CUSP * usual:
-        where = float(candidates[np.argmin(sizes)])
-        message = f"the curve has a cusp at s = {_shown(where)}: its tangent vanishes there, and no motion along it"
+        s = float(candidates[np.argmin(sizes)])
+        message = f"the curve has a cusp at s = {_shown(s)}: its tangent vanishes there, and no motion along it"
         raise MechanismError(f"{message} is determined; leave that place out by a range, or take another parameter")
 
 
-def _check_jumps(at: Callable[[Parameters], Values], parameters: Parameters, values: Values) -> None:
+def _check_jumps(evaluate: Callable[[Parameters], Values], parameters: Parameters, values: Values) -> None:
     """Raise MechanismError for a jump, found by bisection of the half of each interval in which values change more."""
     sizes = np.max(np.where(np.isfinite(values), np.abs(values), 0.0), axis=(1, 2))
 
@@ -130,15 +130,15 @@ def _check_jumps(at: Callable[[Parameters], Values], parameters: Parameters, val
             if not (change(first, last)[level] > JUMP).any():
                 break
             middle = 0.5 * (low + high)
-            between = at(middle)
-            left = change(first, between)[level] >= change(between, last)[level]
+            middle_values = evaluate(middle)
+            left = change(first, middle_values)[level] >= change(middle_values, last)[level]
             low, high = np.where(left, low, middle), np.where(left, middle, high)
-            first, last = np.where(left, first, between), np.where(left, between, last)
+            first, last = np.where(left, first, middle_values), np.where(left, middle_values, last)
         else:
             jumps = change(first, last)[level]
             if jumps.max() > JUMP:
-                where = _shown(float(low[np.argmax(jumps)]))
-                raise MechanismError(f"the curve {_WORDS[level]} at s = {where}; {_ADVICE}")
+                place = _shown(float(low[np.argmax(jumps)]))
+                raise MechanismError(f"the curve {_WORDS[level]} at s = {place}; {_ADVICE}")
 
 
 _WORDS = (
@@ -150,10 +150,10 @@ _WORDS = (
 _ADVICE = "it must be smooth where a point moves along it: round it off, or leave that place out by a range"
 
 
-def _check_seam(at: Callable[[Parameters], Values], low: float, high: float, values: Values) -> None:
+def _check_seam(evaluate: Callable[[Parameters], Values], low: float, high: float, values: Values) -> None:
     """Raise MechanismError unless a closed curve continues beyond its end as at its beginning."""
-    since = np.linspace(0.0, 0.3 * (high - low), 7)
-    begins, ends = at(low + since), at(high + since)
+    offsets = np.linspace(0.0, 0.3 * (high - low), 7)
+    begins, ends = evaluate(low + offsets), evaluate(high + offsets)
     sizes = np.abs(values).max(axis=(1, 2))
     sizes[0] = max(np.ptp(values[0], axis=1))
     if (gap := np.linalg.norm(ends[0, :, 0] - begins[0, :, 0])) > JUMP * sizes[0]:
@@ -172,9 +172,9 @@ def check_points(points: np.ndarray, *, closed: bool, least: int) -> Float[np.nd
     """Return points of a curve after a check of its smoothness; a closed one repeats its first point at the end."""
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise MechanismError("points of a curve are rows of two or three numbers", name="points", value=points.shape)
-    bad = np.argwhere(~np.isfinite(points))
-    if len(bad):
-        raise MechanismError("must be finite", name=f"points[{bad[0][0]}]", value=points[bad[0][0]].tolist())
+    failures = np.argwhere(~np.isfinite(points))
+    if len(failures):
+        raise MechanismError("must be finite", name=f"points[{failures[0][0]}]", value=points[failures[0][0]].tolist())
     size = float(np.ptp(points, axis=0).max(initial=0.0))
     if closed and len(points) and np.linalg.norm(points[-1] - points[0]) > 1e-9 * size:
         points = np.concatenate([points, points[:1]])
@@ -194,9 +194,9 @@ def check_points(points: np.ndarray, *, closed: bool, least: int) -> Float[np.nd
         raise MechanismError(
             f"{message} {np.median(chords):.3g} m apart; give points between, all nearly evenly", name=f"points[{row}]"
         )
-    along = steps / chords[:, None]
-    after = np.roll(along, -1, axis=0) if closed else along[1:]
-    turns = np.degrees(np.arccos(np.clip((along[: len(after)] * after).sum(axis=1), -1, 1)))
+    directions = steps / chords[:, None]
+    next_directions = np.roll(directions, -1, axis=0) if closed else directions[1:]
+    turns = np.degrees(np.arccos(np.clip((directions[: len(next_directions)] * next_directions).sum(axis=1), -1, 1)))
     neighbors = (
         [np.roll(turns, shift) for shift in (-1, 1)] if closed else [np.append(turns[1:], 0), np.append(0, turns[:-1])]
     )

@@ -54,10 +54,10 @@ class ParametricCurve:
     closed: bool = False
 
     def __post_init__(self) -> None:
-        given = self.expressions
-        if isinstance(given, str) or not isinstance(given, Sequence):
-            raise MechanismError("must be a list of expressions, one for each coordinate", value=given)
-        object.__setattr__(self, "expressions", tuple(given))
+        expressions = self.expressions
+        if isinstance(expressions, str) or not isinstance(expressions, Sequence):
+            raise MechanismError("must be a list of expressions, one for each coordinate", value=expressions)
+        object.__setattr__(self, "expressions", tuple(expressions))
         if self.range is not None:
             object.__setattr__(self, "range", tuple(tuple(x) if isinstance(x, list) else x for x in self.range))
         if not isinstance(self.closed, bool):
@@ -192,8 +192,8 @@ def resolve_curve(
         raise MechanismError("a surface is not closed; it goes on as far as its expressions do", name="closed")
     formulas = tuple(_formula(entry, names, parameters) for entry in given.expressions)
     ends = None if given.range is None else _range(given.range, len(names), parameters)
-    if ends is None and (word := refuses_without_ends(formulas)):
-        message = f"{word} may have kinks or ends; give the range of {' and '.join(names)} in which the curve is smooth"
+    if ends is None and (noun := refuses_without_ends(formulas)):
+        message = f"{noun} may have kinks or ends; give the range of {' and '.join(names)} in which the curve is smooth"
         raise MechanismError(message, name="range")
     traced = any(isinstance(x, Tracer) for x in (*parameters.values(), *(ends or ())))
     window = ends or tuple(x + sign * HALF_WINDOW for x in _near(start, len(names)) for sign in (-1, 1))
@@ -209,8 +209,8 @@ def _near(start: Any, count: int) -> Float[np.ndarray, " parameter"]:
     return np.array(start, float)
 
 
-def _formula(given: Any, names: tuple[str, ...], parameters: Mapping[str, Any]) -> _Formula:
-    expression = _expression(given)
+def _formula(entry: Any, names: tuple[str, ...], parameters: Mapping[str, Any]) -> _Formula:
+    expression = _expression(entry)
     for name in sorted(expression.names & set(names) & set(parameters)):
         message = f"the parameter '{name}' has the name of the parameter of a curve; give it another name"
         raise MechanismError(message, value=expression.text)
@@ -218,16 +218,16 @@ def _formula(given: Any, names: tuple[str, ...], parameters: Mapping[str, Any]) 
     return _Formula(expression, names, {name: parameters[name] for name in sorted(expression.names - {*names})})
 
 
-def _expression(given: Any) -> Expression:
-    return given if isinstance(given, Expression) else Expression(given if isinstance(given, str) else repr(given))
+def _expression(entry: Any) -> Expression:
+    return entry if isinstance(entry, Expression) else Expression(entry if isinstance(entry, str) else repr(entry))
 
 
-def _range(given: Any, count: int, parameters: Mapping[str, Any]) -> tuple[Any, ...]:
+def _range(entry: Any, count: int, parameters: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return the least and the greatest value of each parameter, in turn."""
-    pairs = [given] if count == 1 else list(given)
+    pairs = [entry] if count == 1 else list(entry)
     if len(pairs) != count or not all(isinstance(pair, tuple | list) and len(pair) == 2 for pair in pairs):
-        words = "[first, last]" if count == 1 else "[[first, last], [first, last]], of u and of v"
-        raise MechanismError(f"must be {words}", name="range", value=given)
+        expected = "[first, last]" if count == 1 else "[[first, last], [first, last]], of u and of v"
+        raise MechanismError(f"must be {expected}", name="range", value=entry)
     limits = []
     for pair in pairs:
         try:
@@ -244,8 +244,8 @@ def _range(given: Any, count: int, parameters: Mapping[str, Any]) -> tuple[Any, 
 
 @lru_cache(maxsize=200)
 def _checked_once(formulas: Any, window: tuple[float, ...], stated: bool, closed: bool) -> None:
-    names, parts = formulas
-    curve = tuple(_Formula(expression, names, dict(parameters)) for expression, parameters in parts)
+    names, expressions = formulas
+    curve = tuple(_Formula(expression, names, dict(parameters)) for expression, parameters in expressions)
     check_curve(curve, window, stated=stated, closed=closed)
 
 
@@ -253,8 +253,8 @@ def _checked(formulas: tuple[_Formula, ...], window: tuple[float, ...], stated: 
     """Check the smoothness of a curve, once for the same numbers; surfaces are not checked."""
     if count > 1:
         return
-    parts = tuple((f.expression, tuple((k, float(v)) for k, v in f.known.items())) for f in formulas)
-    _checked_once((formulas[0].names, parts), window, stated, closed)
+    expressions = tuple((f.expression, tuple((k, float(v)) for k, v in f.known.items())) for f in formulas)
+    _checked_once((formulas[0].names, expressions), window, stated, closed)
 
 
 def _unit(formulas: tuple[_Formula, ...], window: tuple[Any, ...]) -> Any:
@@ -264,15 +264,13 @@ def _unit(formulas: tuple[_Formula, ...], window: tuple[Any, ...]) -> Any:
     for varied in range(count):
         turn = (varied, 1 - varied)[:count]
         spread = (shares, (shares * 7.3) % 1.0)[:count]
-        given = [
-            window[2 * k] + (window[2 * k + 1] - window[2 * k]) * share for k, share in zip(turn, spread, strict=True)
-        ]
+        samples = [window[2 * k] + (window[2 * k + 1] - window[2 * k]) * u for k, u in zip(turn, spread, strict=True)]
         if traced:
-            jets = [Jet.variable(jnp.asarray(given[0]), 1), *(Jet.constant(jnp.asarray(x), 1) for x in given[1:])]
+            jets = [Jet.variable(jnp.asarray(samples[0]), 1), *(Jet.constant(jnp.asarray(x), 1) for x in samples[1:])]
             speed = sum(f(*(jets[k] for k in turn)).dense().coefficients[1] ** 2 for f in formulas)
         else:
             ordered = [partial(_turned, f, turn) for f in formulas]
-            speed = (derivatives_at(ordered, *map(np.asarray, given))[1] ** 2).sum(axis=0)
+            speed = (derivatives_at(ordered, *map(np.asarray, samples))[1] ** 2).sum(axis=0)
         namespace = jnp if traced else np
         lengths.append(namespace.sqrt(namespace.mean(namespace.where(namespace.isfinite(speed), speed, 0.0))))
     unit = lengths[0] if count == 1 else (lengths[0] * lengths[1]) ** 0.5
@@ -286,14 +284,14 @@ def _turned(formula: _Formula, turn: tuple[int, ...], *jets: Jet) -> Jet:
     return formula(*(jets[k] for k in turn))
 
 
-def _through_points(given: SampledCurve, names: tuple[str, ...], components: int) -> CurveLaw:
+def _through_points(curve: SampledCurve, names: tuple[str, ...], components: int) -> CurveLaw:
     if len(names) > 1:
         raise MechanismError("a surface is given by expressions of u and v", name="surface")
-    points: Any = given.points
+    points: Any = curve.points
     if points.shape[1] != components:
         message = f"points of this curve have {components} coordinates"
         raise MechanismError(message, name="samples", value=int(points.shape[1]))
-    beyond = "repeat" if given.closed else "continue"
-    laws = tuple(SplineMotion(given.parameter, column, given.degree, beyond) for column in points.T)
-    last = given.length
-    return CurveLaw(laws, None if given.closed else (0.0, last), 1.0, last if given.closed else None)
+    extrapolation = "repeat" if curve.closed else "continue"
+    laws = tuple(SplineMotion(curve.parameter, column, curve.degree, extrapolation) for column in points.T)
+    length = curve.length
+    return CurveLaw(laws, None if curve.closed else (0.0, length), 1.0, length if curve.closed else None)

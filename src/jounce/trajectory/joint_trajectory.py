@@ -76,8 +76,8 @@ class JointTrajectory(Displayed):
     ):
         if not isinstance(laws, Mapping) or not laws:
             raise TrajectoryError("a trajectory needs a law for at least one joint", name="laws", value=laws)
-        given = laws.given() if isinstance(laws, Laws) else laws
-        self.laws = Laws({name: given_law(name, x) for name, x in given.items()})
+        user_laws = laws.given() if isinstance(laws, Laws) else laws
+        self.laws = Laws({name: given_law(name, x) for name, x in user_laws.items()})
         self.start, self.stop = finite_numbers("start and stop", (start, stop), (2,), read=seconds).tolist()
         if self.stop <= self.start:
             raise TrajectoryError(f"must come after the start, {self.start:g} s", name="stop", value=self.stop)
@@ -109,8 +109,8 @@ class JointTrajectory(Displayed):
         >>> jn.JointTrajectory({"a": "t", "b": "t**2"}, 0.0, 1.0).part(["b"]).names
         ('b',)
         """
-        given = self.laws.given()
-        laws = {name: given[name] for name in names}
+        user_laws = self.laws.given()
+        laws = {name: user_laws[name] for name in names}
         measures = {name: measure for name, measure in self.measures.items() if name in laws}
         return JointTrajectory(laws, self.start, self.stop, self.times, measures)
 
@@ -223,12 +223,12 @@ class JointTrajectory(Displayed):
                 raise error.located(name=names[k]) from None
 
         if duration is None:
-            moving = np.flatnonzero(begins != ends).tolist()
+            moving_joints = np.flatnonzero(begins != ends).tolist()
             if limits is None:
                 raise TrajectoryError("either limits or a duration are needed", name="duration", value=duration)
-            if not moving:
+            if not moving_joints:
                 raise TrajectoryError("the start is the end; give a duration", name="duration", value=duration)
-            duration = max(float(law(k, None).duration) for k in moving)
+            duration = max(float(law(k, None).duration) for k in moving_joints)
         return cls({name: law(k, duration) for k, name in enumerate(names)}, start_time, start_time + duration)
 
     @property
@@ -294,10 +294,10 @@ class JointTrajectory(Displayed):
         self._warn(order, chosen)
         derivatives = law_derivatives([self.laws[name] for name in chosen], instants, order)
         result = np.ascontiguousarray(np.moveaxis(derivatives, -1, 0))
-        if len(bad := np.argwhere(~np.isfinite(result))):
-            at, derivative, joint = bad[0]
-            where = f"at {instants[at]:.9g} s: derivative {derivative} is no number"
-            raise TrajectoryError(f"the law is not defined or not smooth {where}", name=f"laws.{chosen[joint]}")
+        if len(failures := np.argwhere(~np.isfinite(result))):
+            sample, derivative, joint = failures[0]
+            phrase = f"at {instants[sample]:.9g} s: derivative {derivative} is no number"
+            raise TrajectoryError(f"the law is not defined or not smooth {phrase}", name=f"laws.{chosen[joint]}")
         return result
 
     def estimate_error(self, order: int, names: Iterable[str] | None = None) -> Array[np.ndarray, "derivative joint"]:
@@ -365,9 +365,9 @@ class JointTrajectory(Displayed):
             if isinstance(law, SplineMotion) and (doubt := unsupported_derivative(law.errors, order)):
                 phrases.append((doubt[0], -doubt[1], name))
         if phrases:
-            worst, error, name = min(phrases)
-            words = unsupported_words(name, worst, -error, self.laws[name], " by jn.smooth or jounce smooth")
-            warnings.warn(SampleWarning(words), stacklevel=3)
+            derivative, error, name = min(phrases)
+            message = unsupported_words(name, derivative, -error, self.laws[name], " by jn.smooth or jounce smooth")
+            warnings.warn(SampleWarning(message), stacklevel=3)
 
     def _chosen(self, names: Iterable[str] | None) -> tuple[str, ...]:
         chosen = self.names if names is None else names_of_joints(names)
@@ -378,9 +378,9 @@ class JointTrajectory(Displayed):
     def _inside(self, times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
         """Return the instants, clipped to the trajectory; raise TrajectoryError for those outside it."""
         slack = 1e-9 * (self.stop - self.start)
-        outside = (times < self.start - slack) | (times > self.stop + slack)
-        if outside.any():
-            first = int(np.flatnonzero(outside)[0])
+        is_outside = (times < self.start - slack) | (times > self.stop + slack)
+        if is_outside.any():
+            first = int(np.flatnonzero(is_outside)[0])
             message = f"the trajectory goes from {self.start:.9g} to {self.stop:.9g} s; choose instants within it"
             raise TrajectoryError(message, name=f"times[{first}]", value=float(times[first]))
         return np.clip(times, self.start, self.stop)
@@ -390,5 +390,5 @@ def _limits(limits: ArrayLike, names: Sequence[str]) -> list[Any]:
     """Return the three limits of each joint."""
     count = len(names)
     shape = (len(LIMITS), count) if np.ndim(limits) == 2 else (len(LIMITS),)
-    given = finite_numbers("limits", in_order("limits", limits, names, TrajectoryError), shape)
-    return np.broadcast_to(given.reshape(len(LIMITS), -1), (len(LIMITS), count)).T.tolist()
+    values = finite_numbers("limits", in_order("limits", limits, names, TrajectoryError), shape)
+    return np.broadcast_to(values.reshape(len(LIMITS), -1), (len(LIMITS), count)).T.tolist()

@@ -24,7 +24,7 @@ def knot_jumps(law: SplineMotion, order: int) -> Jumps:
     lengths = np.diff(np.append(begins, stop))
     powers = np.asarray(law.coefficients, float)
     sines = np.asarray(getattr(law, "sines", np.zeros((3, len(begins)))), float)
-    left, right = (_derivatives(powers, sines, at, order) for at in (lengths, np.zeros(len(begins))))
+    left, right = (_derivatives(powers, sines, local_times, order) for local_times in (lengths, np.zeros(len(begins))))
     before, after, instants = left[:, :-1], right[:, 1:], begins[1:]
     jumps = after - before
     smooth = law.joined
@@ -35,8 +35,8 @@ def knot_jumps(law: SplineMotion, order: int) -> Jumps:
         closing[: smooth + 1] = 0.0
         jumps, instants = np.column_stack([closing, jumps]), begins
     elif law.beyond == "hold":
-        rest = np.zeros((order + 1, 1))
-        ends = right[:, :1] - rest, rest - left[:, -1:]
+        zeros = np.zeros((order + 1, 1))
+        ends = right[:, :1] - zeros, zeros - left[:, -1:]
         for end in ends:
             end[0] = 0.0
         jumps, instants = np.column_stack([ends[0], jumps, ends[1]]), np.concatenate([begins[:1], instants, [stop]])
@@ -57,7 +57,7 @@ def derivative_sizes(law: AbstractMotion, first: float, last: float, order: int)
 def _derivatives(
     powers: Float[np.ndarray, "powers pieces"],
     sines: Float[np.ndarray, "3 pieces"],
-    at: Float[np.ndarray, " pieces"],
+    times: Float[np.ndarray, " pieces"],
     order: int,
 ) -> Float[np.ndarray, "levels pieces"]:
     """Return the derivatives of each piece at a time after its beginning."""
@@ -65,9 +65,9 @@ def _derivatives(
     derivatives = []
     for k in range(order + 1):
         polynomial = sum(
-            (c * math.perm(j, k) * at ** (j - k) for j, c in enumerate(powers) if j >= k), np.zeros_like(at)
+            (c * math.perm(j, k) * times ** (j - k) for j, c in enumerate(powers) if j >= k), np.zeros_like(times)
         )
-        derivatives.append(polynomial + amplitude * frequency**k * np.sin(frequency * at + phase + k * math.pi / 2))
+        derivatives.append(polynomial + amplitude * frequency**k * np.sin(frequency * times + phase + k * math.pi / 2))
     return np.array(derivatives)
 
 
@@ -80,9 +80,9 @@ def _largest(
 ) -> Float[np.ndarray, " levels"]:
     """Return bounds of the derivatives of a law, of the size of their peaks."""
     powers, (amplitude, frequency, _) = np.abs(powers), np.abs(sines)
-    at = np.minimum(lengths, np.max(lengths[1:], initial=0.0)) if law.beyond == "continue" else lengths
+    times = np.minimum(lengths, np.max(lengths[1:], initial=0.0)) if law.beyond == "continue" else lengths
     terms = [
-        sum((c * math.perm(j, k) * at ** (j - k) for j, c in enumerate(powers) if j >= k), np.zeros_like(at))
+        sum((c * math.perm(j, k) * times ** (j - k) for j, c in enumerate(powers) if j >= k), np.zeros_like(times))
         + amplitude * frequency**k
         for k in range(order + 1)
     ]

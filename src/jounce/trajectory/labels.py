@@ -9,7 +9,7 @@ import numpy as np
 
 
 def in_order(
-    name: str, values: Any, labels: Sequence[str], error: Callable[..., Exception], what: str = "joints"
+    name: str, values: Any, labels: Sequence[str], error: Callable[..., Exception], plural: str = "joints"
 ) -> Any:
     """Return values with the labels of their last axis in a given order; unchanged if they have no such labels.
 
@@ -28,21 +28,21 @@ def in_order(
     """
     if hasattr(values, "isel") and hasattr(values, "indexes"):
         axes = [_texts(values.indexes.get(axis)) for axis in values.dims]
-        moved = "joint" in values.dims[:-1]
+        is_transposed = "joint" in values.dims[:-1]
     elif hasattr(values, "iloc") and hasattr(values, "axes"):
-        axes, moved = [_texts(axis) for axis in values.axes], False
+        axes, is_transposed = [_texts(axis) for axis in values.axes], False
     else:
         return values
-    last, expected = (axes[-1] if axes else []), set(labels)
-    if expected.isdisjoint(last) and (moved or any(expected <= set(axis) for axis in axes)):
-        raise error(f"the {what} must be along the last axis: transpose it", name=name)
+    last_labels, expected = (axes[-1] if axes else []), set(labels)
+    if expected.isdisjoint(last_labels) and (is_transposed or any(expected <= set(axis) for axis in axes)):
+        raise error(f"the {plural} must be along the last axis: transpose it", name=name)
     _check_derivatives(name, values, error)
-    if expected.isdisjoint(last) or last == list(labels):
+    if expected.isdisjoint(last_labels) or last_labels == list(labels):
         return values
-    if len(last) != len(expected) or set(last) != expected:
-        message = f"its last axis must have each of the {what} {', '.join(labels)} once, and nothing else"
-        raise error(message, name=name, value=", ".join(last))
-    order = [last.index(label) for label in labels]
+    if len(last_labels) != len(expected) or set(last_labels) != expected:
+        message = f"its last axis must have each of the {plural} {', '.join(labels)} once, and nothing else"
+        raise error(message, name=name, value=", ".join(last_labels))
+    order = [last_labels.index(label) for label in labels]
     return values.isel({values.dims[-1]: order}) if hasattr(values, "isel") else values.iloc[..., order]
 
 
@@ -72,12 +72,12 @@ def check_rows(name: str, times: Any, values: Any, error: Callable[..., Exceptio
         message = "the times are its labels, in another order: sort times and values alike"
         raise error(message, name=name, value=f"{rows[0]} first")
     if hasattr(values, "isel") and hasattr(values, "indexes") and "derivative" in values.dims[1:]:
-        columns, named = list(values.indexes.get("derivative", ())), True
+        columns, is_named = list(values.indexes.get("derivative", ())), True
     else:
         columns = list(getattr(values, "columns", ()))
-        named = getattr(getattr(values, "columns", None), "name", None) == "derivative"
+        is_named = getattr(getattr(values, "columns", None), "name", None) == "derivative"
     orders = list(range(len(columns)))
-    if columns != orders and (named or set(columns) == set(orders)) and columns:
+    if columns != orders and (is_named or set(columns) == set(orders)) and columns:
         raise error("its derivatives must be those of order 0, 1, 2 and so on", name=name, value=columns)
 
 

@@ -195,9 +195,9 @@ class SplineMotion(AbstractMotion):
             If an instant is beyond the samples and `beyond` is ``"refuse"``; for traced values, which cannot raise
             errors, the law is NaN there.
         """
-        where = self.breakpoints, self.stop, time.coefficients[0]
-        if self.beyond == "refuse" and np.ndim(self.stop) == 0 and not is_traced(where) and np.size(where[2]):
-            self.check_instants(float(np.min(where[2])), float(np.max(where[2])))
+        values = self.breakpoints, self.stop, time.coefficients[0]
+        if self.beyond == "refuse" and np.ndim(self.stop) == 0 and not is_traced(values) and np.size(values[2]):
+            self.check_instants(float(np.min(values[2])), float(np.max(values[2])))
         # one program for a call outside of other programs
         return (SplineMotion._evaluated if is_traced((self, time)) else _compiled_evaluation)(self, time)
 
@@ -219,14 +219,14 @@ class SplineMotion(AbstractMotion):
         """Return the beginnings of the pieces at given instants, and their columns of a table, (rows, pieces)."""
         breakpoints = jnp.asarray(self.breakpoints)
         if breakpoints.ndim == 1:
-            piece = last_begun(breakpoints, instants)
-            start, columns = (x.at[..., piece].get(mode="promise_in_bounds") for x in (breakpoints, table))
+            index = last_begun(breakpoints, instants)
+            start, columns = (x.at[..., index].get(mode="promise_in_bounds") for x in (breakpoints, table))
             return start, columns
         # several stacked drivers of one kind, along an axis before the batch: (samples, drivers, 1)
         rows = jnp.broadcast_to(instants, (breakpoints.shape[1], instants.shape[-1]))
-        piece = jax.vmap(last_begun, in_axes=(1, 0))(breakpoints[..., 0], rows)
-        start = jnp.take_along_axis(breakpoints[..., 0], piece.T, axis=0).T
-        return start, jnp.swapaxes(jnp.take_along_axis(table[..., 0], piece.T[None], axis=1), 1, 2)
+        index = jax.vmap(last_begun, in_axes=(1, 0))(breakpoints[..., 0], rows)
+        start = jnp.take_along_axis(breakpoints[..., 0], index.T, axis=0).T
+        return start, jnp.swapaxes(jnp.take_along_axis(table[..., 0], index.T[None], axis=1), 1, 2)
 
 
 _compiled_evaluation = jax.jit(SplineMotion._evaluated)

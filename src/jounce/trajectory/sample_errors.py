@@ -44,9 +44,9 @@ def derivative_errors(
     blocks = _blocks(len(times))
     by_block = [_absolute(times[block], values[block], degree) for block in blocks]
     scatter, period = float(np.ptp(values)), float(times[-1] - times[0])
-    least = scatter / 2 * (2 * math.pi / period) ** np.arange(degree + 1)
+    min_peaks = scatter / 2 * (2 * math.pi / period) ** np.arange(degree + 1)
     errors, peaks = np.max([f[0] for f in by_block], axis=0), np.max([f[1] for f in by_block], axis=0)
-    return np.minimum(1.0, errors / np.maximum(peaks, least))
+    return np.minimum(1.0, errors / np.maximum(peaks, min_peaks))
 
 
 def _blocks(count: int) -> list[slice]:
@@ -68,10 +68,10 @@ def _absolute(times: np.ndarray, values: np.ndarray, degree: int) -> tuple[np.nd
 
     fine = make_interp_spline(times, values, k=degree)
     coarse = make_interp_spline(times[half], values[half], k=degree)
-    at, strength = _between(times), amplification(times, degree, degree)
+    instants, strength = _between(times), amplification(times, degree, degree)
     for k in range(degree + 1):
-        curve = fine(at, nu=k)
-        interpolation = float(np.abs(curve - coarse(at, nu=k)).max()) / (2.0 ** (degree + 1 - k) - 1)
+        curve = fine(instants, nu=k)
+        interpolation = float(np.abs(curve - coarse(instants, nu=k)).max()) / (2.0 ** (degree + 1 - k) - 1)
         errors[k] = INTERPOLATION_SAFETY * interpolation + NOISE_SAFETY * sigma * strength[k]
         peaks[k] = np.abs(curve).max()
     return errors, peaks
@@ -87,11 +87,11 @@ def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int)
     order : int
         Highest requested derivative.
     """
-    known = np.append(errors, 1.0 if errors.any() else 0.0)[: order + 1]
-    if (known <= TOLERANCE).all():
+    all_errors = np.append(errors, 1.0 if errors.any() else 0.0)[: order + 1]
+    if (all_errors <= TOLERANCE).all():
         return None
-    worst = int(np.argmax(known > TOLERANCE))
-    return worst, float(known[worst])
+    index = int(np.argmax(all_errors > TOLERANCE))
+    return index, float(all_errors[index])
 
 
 def unsupported_words(name: str, order: int, error: float, law: Any, by: str = "") -> str:
@@ -114,15 +114,15 @@ def noise(times: Float[np.ndarray, " samples"], values: Float[np.ndarray, " samp
     scaled to weights of unit norm, keep its standard deviation. The estimate is the least over the orders.
     """
     floor = float(np.abs(values).max()) * np.finfo(float).eps / 4
-    least = math.inf
+    estimate = math.inf
     for order in range(1, min(12, len(times) - 1)):
         windows = np.lib.stride_tricks.sliding_window_view(times, order + 1)
         gaps = windows[:, :, None] - windows[:, None, :] + np.eye(order + 1)
         weights = 1 / np.prod(gaps / (windows[:, -1:, None] - windows[:, :1, None]), axis=2)
         weights = weights / np.sqrt((weights**2).sum(axis=1, keepdims=True))
         samples = np.lib.stride_tricks.sliding_window_view(values, order + 1)
-        least = min(least, float(np.sqrt(((weights * samples).sum(axis=1) ** 2).mean())))
-    return max(floor, least) if math.isfinite(least) else floor
+        estimate = min(estimate, float(np.sqrt(((weights * samples).sum(axis=1) ** 2).mean())))
+    return max(floor, estimate) if math.isfinite(estimate) else floor
 
 
 def amplification(times: Float[np.ndarray, " samples"], degree: int, order: int) -> Float[np.ndarray, " derivative"]:
@@ -145,13 +145,13 @@ def amplification(times: Float[np.ndarray, " samples"], degree: int, order: int)
         window = times[first : first + width]
         origin, step = window[0], (window[-1] - window[0]) / (width - 1)
         influence = make_interp_spline((window - origin) / step, np.eye(width), k=degree)
-        at = _between((window - origin) / step)
+        grid = _between((window - origin) / step)
         # an end of the window within the samples is no end of the spline
         low = 0 if first == 0 else width // 3
         high = width if first + width == len(times) else width - width // 3
-        at = at[(at >= (window[low] - origin) / step) & (at <= (window[high - 1] - origin) / step)]
+        grid = grid[(grid >= (window[low] - origin) / step) & (grid <= (window[high - 1] - origin) / step)]
         for k in range(order + 1):
-            spread = np.sqrt((influence(at, nu=k) ** 2).sum(axis=1)).max() / step**k
+            spread = np.sqrt((influence(grid, nu=k) ** 2).sum(axis=1)).max() / step**k
             strongest[k] = max(strongest[k], float(spread))
     return strongest
 
@@ -159,5 +159,5 @@ def amplification(times: Float[np.ndarray, " samples"], degree: int, order: int)
 def _between(times: np.ndarray) -> np.ndarray:
     """Return four instants on each interval, and the last one."""
     shares = np.array([0.0, 0.25, 0.5, 0.75])
-    inside = times[:-1, None] + np.diff(times)[:, None] * shares
-    return np.append(inside.reshape(-1), times[-1])
+    inner = times[:-1, None] + np.diff(times)[:, None] * shares
+    return np.append(inner.reshape(-1), times[-1])

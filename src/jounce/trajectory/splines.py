@@ -89,13 +89,13 @@ def _sums_before(terms: list[float]) -> list[float]:
 
     The rounding error of each addition is added up separately (the two-sum of Knuth).
     """
-    sums, total, compensation = [], 0.0, 0.0
+    sums, partial_sum, compensation = [], 0.0, 0.0
     for term in terms:
-        sums.append(total + compensation)
-        raised = total + term
-        own = raised - total
-        compensation += (total - (raised - own)) + (term - own)
-        total = raised
+        sums.append(partial_sum + compensation)
+        raised = partial_sum + term
+        addend = raised - partial_sum
+        compensation += (partial_sum - (raised - addend)) + (term - addend)
+        partial_sum = raised
     return sums
 
 
@@ -107,16 +107,16 @@ def _interpolated(times: _Samples, values: _Samples, degree: int, **ends: Any) -
     first = values[0]  # subtracted, so that constant samples are exactly at rest
     with np.errstate(over="ignore", invalid="ignore"):
         spline = make_interp_spline((times - times[0]) / scale, values - first, k=degree, **ends)
-        inside = np.unique(spline.t[degree : len(spline.t) - degree])
-        powers = local_powers(spline, inside[:-1], degree) / scale ** np.arange(degree + 1)[:, None]
+        knots = np.unique(spline.t[degree : len(spline.t) - degree])
+        powers = local_powers(spline, knots[:-1], degree) / scale ** np.arange(degree + 1)[:, None]
     powers[0] += first
     if not np.isfinite(powers).all():
         raise ValueError("derivatives beyond the range of numbers")
-    breakpoints = times[0] + inside * scale
-    near = np.clip(np.searchsorted(times, breakpoints), 1, len(times) - 1)
-    near = np.where(breakpoints - times[near - 1] < times[near] - breakpoints, near - 1, near)
-    rounded = np.abs(times[near] - breakpoints) <= 8 * np.finfo(float).eps * np.abs(times).max()
-    return np.where(rounded, times[near], breakpoints), powers
+    breakpoints = times[0] + knots * scale
+    indices = np.clip(np.searchsorted(times, breakpoints), 1, len(times) - 1)
+    indices = np.where(breakpoints - times[indices - 1] < times[indices] - breakpoints, indices - 1, indices)
+    rounded = np.abs(times[indices] - breakpoints) <= 8 * np.finfo(float).eps * np.abs(times).max()
+    return np.where(rounded, times[indices], breakpoints), powers
 
 
 def _periodic(times: _Samples, values: _Samples, degree: int, beyond: str) -> tuple[_Breakpoints, _Pieces, float]:

@@ -22,8 +22,8 @@ Breaks = Float[np.ndarray, " break"]
 def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order: int) -> Breaks:
     """Return the sorted instants at which a derivative up to an order jumps or bends, s.
 
-    Where pieces of a law meet is known, also where they are passed by what leads the law. Kinks of expressions and
-    of Python functions are looked for, up to the fifth derivative.
+    The instants at which pieces of a law meet are known, also those at which a leader passes them. Kinks of expressions
+    and of Python functions are looked for, up to the fifth derivative.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
     [0.1, 0.25, 0.75]
     """
     breaks, leader_values = [np.zeros(0)], LeaderValues()
-    every = {id(law): law for law in _with_leaders(laws)}.values()  # several laws may have one leader
-    for law in every if last > first else ():
+    distinct_laws = {id(law): law for law in _with_leaders(laws)}.values()  # several laws may have one leader
+    for law in distinct_laws if last > first else ():
         level = min(order + 1, HIGHEST)
         instants, jumps, _ = known_jumps(law, first, last, level, leader_values)
         jump, bend = np.any(jumps[:-1] != 0, axis=0), jumps[-1] != 0
@@ -68,9 +68,9 @@ def both_sides(
     """
     offset = _side_offset(first, last)
     instants = (breaks[:, None] + offset * np.array([-1.0, 1.0])).ravel()
-    which = np.repeat(np.arange(len(breaks)), 2)
-    inside = (instants > first) & (instants < last)
-    return instants[inside], which[inside]
+    indices = np.repeat(np.arange(len(breaks)), 2)
+    is_inside = (instants > first) & (instants < last)
+    return instants[is_inside], indices[is_inside]
 
 
 def with_sides(instants: Times, breaks: Breaks) -> Float[np.ndarray, " all"]:
@@ -88,10 +88,10 @@ def at_breaks(instants: Times, breaks: Breaks, first: float, last: float) -> Tim
     """
     if not len(breaks):
         return instants
-    after = np.clip(np.searchsorted(breaks, instants), 1, max(len(breaks) - 1, 1))
-    pair = breaks[np.stack([after - 1, np.minimum(after, len(breaks) - 1)])]
-    nearest = np.where(np.abs(pair[0] - instants) <= np.abs(pair[1] - instants), pair[0], pair[1])
-    return np.where(np.abs(nearest - instants) <= 1.5 * _side_offset(first, last), nearest, instants)
+    next_index = np.clip(np.searchsorted(breaks, instants), 1, max(len(breaks) - 1, 1))
+    pair = breaks[np.stack([next_index - 1, np.minimum(next_index, len(breaks) - 1)])]
+    nearest_breaks = np.where(np.abs(pair[0] - instants) <= np.abs(pair[1] - instants), pair[0], pair[1])
+    return np.where(np.abs(nearest_breaks - instants) <= 1.5 * _side_offset(first, last), nearest_breaks, instants)
 
 
 def _side_offset(first: float, last: float) -> float:
@@ -110,8 +110,8 @@ def _with_leaders(laws: Iterable[AbstractMotion]) -> Iterator[AbstractMotion]:
         yield law
         if isinstance(law, FollowingMotion):
             yield from _with_leaders(law.parts[1:])
-        elif parts := getattr(law, "parts", ()):
-            yield from (x for part in parts for x in _with_leaders([part]) if x is not part)
+        elif laws_ := getattr(law, "parts", ()):
+            yield from (x for law_ in laws_ for x in _with_leaders([law_]) if x is not law_)
 
 
 def may_break(law: AbstractMotion) -> bool:

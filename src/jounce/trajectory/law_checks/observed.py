@@ -33,8 +33,8 @@ def may_bend(law: Any) -> bool:
     >>> may_bend(law("t**3/2 + sin(t)")), may_bend(law("atan(1/t)")), may_bend(law("(t**2)**0.5"))
     (False, True, True)
     """
-    if parts := getattr(law, "parts", ()):
-        return any(map(may_bend, parts[:1] if isinstance(law, FollowingMotion) else parts))
+    if members := getattr(law, "parts", ()):
+        return any(map(may_bend, members[:1] if isinstance(law, FollowingMotion) else members))
     if isinstance(law, ExpressionMotion):
         return _has_singularities(law.expression)
     return not isinstance(law, SplineMotion | AbstractProfile)
@@ -43,25 +43,25 @@ def may_bend(law: Any) -> bool:
 def _has_singularities(expression: Expression) -> bool:
     """Tell whether an operation on something that moves with time has places where it is not analytic.
 
-    Of each part: its value where that is a number, whether it moves, and whether there are such places.
+    Each operand is folded to its value if that is a number, whether it moves, and whether it has such places.
     """
 
-    def operation(word: str, parts: list[Any]) -> Any:
-        moves = [part[1] for part in parts]
-        smooth = word in SMOOTH or not any(moves)
-        if word == "/":
+    def operation(operator_: str, operands: list[Any]) -> Any:
+        moves = [operand[1] for operand in operands]
+        smooth = operator_ in SMOOTH or not any(moves)
+        if operator_ == "/":
             smooth = not moves[1]
-        if word == "**" and not moves[1]:
-            exponent = parts[1][0]
+        if operator_ == "**" and not moves[1]:
+            exponent = operands[1][0]
             smooth = not moves[0] or (exponent is not None and exponent >= 0 and float(exponent).is_integer())
-        value = parts[0][0] if word == "pos" else None
-        return value, any(moves), not smooth or any(part[2] for part in parts)
+        value = operands[0][0] if operator_ == "pos" else None
+        return value, any(moves), not smooth or any(operand[2] for operand in operands)
 
     return expression.folded(lambda x: (x, False, False), lambda name: (None, name == "t", False), operation)[2]
 
 
 def observed_jumps(laws: list[AbstractMotion], first: float, last: float, order: int) -> SeenJumps:
-    """Return where derivatives of laws up to an order, or up to the fifth, are seen to jump.
+    """Return the observed jumps of derivatives of laws up to an order, at most the fifth.
 
     Examples
     --------
@@ -72,12 +72,12 @@ def observed_jumps(laws: list[AbstractMotion], first: float, last: float, order:
     ([0.3], [[0.0, 2.0]])
     """
     order = min(order, HIGHEST_SEEN)
-    read = read_laws(laws)
-    leaves = jax.tree.leaves(read, is_leaf=lambda x: isinstance(x, Composed))
-    plain = all(has_rules(x.program) for x in leaves if isinstance(x, Composed))  # others take twice as long an order
-    levels = order + (TERMS if plain else 1)
+    programs = read_laws(laws)
+    leaves = jax.tree.leaves(programs, is_leaf=lambda x: isinstance(x, Composed))
+    has_all = all(has_rules(x.program) for x in leaves if isinstance(x, Composed))  # others take twice as long an order
+    levels = order + (TERMS if has_all else 1)
 
     def evaluate(times: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time level joint"]:
-        return np.moveaxis(law_derivatives(read, times, levels), -1, 0).copy()
+        return np.moveaxis(law_derivatives(programs, times, levels), -1, 0).copy()
 
     return seen_jumps(evaluate, first, last, order)

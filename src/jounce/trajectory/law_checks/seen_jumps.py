@@ -61,10 +61,10 @@ class SeenJumps(NamedTuple):
 
 def level_sizes(values: Float[np.ndarray, "time level joint"], duration: float) -> Float[np.ndarray, "level joint"]:
     """Return the size of each derivative; one that is small beside a lower one over the whole time is rounding."""
-    largest = np.abs(values).max(axis=0)
-    sizes = largest.copy()
+    peaks = np.abs(values).max(axis=0)
+    sizes = peaks.copy()
     for level in range(2, len(sizes)):
-        sizes[level] = np.maximum(largest[level], sizes[level - 1] / duration)
+        sizes[level] = np.maximum(peaks[level], sizes[level - 1] / duration)
     return sizes
 
 
@@ -86,13 +86,13 @@ def unexplained(
     """
     step = np.diff(instants)[:, None, None]
     change, slopes = np.diff(values[:, :-1], axis=0), values[:, 1:]
-    off = np.abs(change - (slopes[1:] + slopes[:-1]) * step / 2)  # part that no slope explains
+    remainder = np.abs(change - (slopes[1:] + slopes[:-1]) * step / 2)  # part that no slope explains
     bends = step * np.abs(np.diff(slopes, axis=0))  # part that a jump of the slope explains
-    return (off > BENT * np.abs(change)) & (off > FAINT * sizes[:-1]) & (off > bends)
+    return (remainder > BENT * np.abs(change)) & (remainder > FAINT * sizes[:-1]) & (remainder > bends)
 
 
 def seen_jumps(evaluate: Evaluation, first: float, last: float, order: int) -> SeenJumps:
-    """Return where derivatives up to an order jump between two instants, by their values, and by how much.
+    """Return the instants at which derivatives up to an order jump in an interval, by their values, and the jumps.
 
     Parameters
     ----------
@@ -113,59 +113,59 @@ def seen_jumps(evaluate: Evaluation, first: float, last: float, order: int) -> S
     >>> seen.instants.round(9).tolist(), seen.sizes[..., 0].round(9).tolist()
     ([0.3], [[0.0, 2.0]])
     """
-    with np.errstate(all="ignore"):  # next to what has no derivatives
+    with np.errstate(all="ignore"):  # next to instants without derivatives
         cells, everywhere = _unsettled_cells(evaluate, first, last, order)
         limits = _limits(evaluate, cells, first, last)
         middle = (cells.low + cells.high) / 2
         jumps = limits.jumps
-        lowest = np.argmax(np.any(jumps != 0, axis=2), axis=1)
+        levels = np.argmax(np.any(jumps != 0, axis=2), axis=1)
         rows = np.arange(len(middle))
-        joint = np.argmax(np.abs(jumps[rows, lowest]), axis=1) if len(rows) else rows
-        below = limits.changes[rows, np.maximum(lowest - 1, 0), joint]
-        width = cells.high - cells.low  # that of a long one ended where rounding hides the place
+        joint = np.argmax(np.abs(jumps[rows, levels]), axis=1) if len(rows) else rows
+        gaps = limits.changes[rows, np.maximum(levels - 1, 0), joint]
+        width = cells.high - cells.low  # a cell stays long where rounding hides the instant
         reach = np.where(width > MARGIN * SHORTEST * (last - first), MARGIN * width, width)
-        shift = np.where(lowest > 0, -below / jumps[rows, lowest, joint], 0.0)  # the derivative below is continuous
+        shift = np.where(levels > 0, -gaps / jumps[rows, levels, joint], 0.0)  # the derivative below is continuous
         shift = np.where(np.abs(shift) <= reach, shift, 0.0)
         wider = np.abs(shift)
-        again = cells._replace(low=cells.low + shift - wider, high=cells.high + shift + wider)
-        jumps = np.where(shift[:, None, None] != 0, _limits(evaluate, again, first, last).jumps, jumps)
-        jumping = (lowest == 0) & np.isfinite(jumps[:, 0]).all(axis=1)
+        shifted = cells._replace(low=cells.low + shift - wider, high=cells.high + shift + wider)
+        jumps = np.where(shift[:, None, None] != 0, _limits(evaluate, shifted, first, last).jumps, jumps)
+        jumping = (levels == 0) & np.isfinite(jumps[:, 0]).all(axis=1)
         ends = _passed(evaluate, cells.low[jumping], cells.high[jumping]) if jumping.any() else 0.0
-    instants = np.where(lowest > 0, middle + shift, cells.high)
-    for end in (cells.low, cells.high):  # which are even shares of the time, where many laws bend: but for rounding
+    instants = np.where(levels > 0, middle + shift, cells.high)
+    for end in (cells.low, cells.high):  # many laws bend at such even fractions of the time
         instants = np.where(np.abs(instants - end) <= END * (last - first), end, instants)
     instants[jumping] = ends
-    some = np.flatnonzero(jumps.any(axis=(1, 2)))
-    some = some[np.argsort(instants[some], kind="stable")]
-    instants, jumps, width = instants[some], jumps[some], width[some]
-    lowest = np.argmax(jumps.any(axis=2), axis=1)
-    remaining = np.ones(len(some), bool)
+    chosen = np.flatnonzero(jumps.any(axis=(1, 2)))
+    chosen = chosen[np.argsort(instants[chosen], kind="stable")]
+    instants, jumps, width = instants[chosen], jumps[chosen], width[chosen]
+    levels = np.argmax(jumps.any(axis=2), axis=1)
+    remaining = np.ones(len(chosen), bool)
     for level in range(order):  # beside a jump, higher derivatives have its rounding
-        lower = instants[lowest == level]
-        remaining &= (lowest <= level) | (_distances(instants, lower) > BLURRED * (last - first))
+        lower = instants[levels == level]
+        remaining &= (levels <= level) | (_distances(instants, lower) > BLURRED * (last - first))
     instants, jumps, width = instants[remaining], jumps[remaining], width[remaining]
     distinct = np.diff(instants) - width[1:] - width[:-1] > 2 * SHORTEST * (last - first)
-    first_ones = np.append(True, distinct)[: len(instants)]
-    return SeenJumps(instants[first_ones], jumps[first_ones], everywhere)
+    is_distinct = np.append(True, distinct)[: len(instants)]
+    return SeenJumps(instants[is_distinct], jumps[is_distinct], everywhere)
 
 
 def _passed(evaluate: Evaluation, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return the instants by which positions have jumped, each after a first and not after a last one, to rounding."""
-    before, after = evaluate(low)[:, 0], evaluate(high)[:, 0]
+    """Return the instants by which positions have jumped, each after `low` and not after `high`, to rounding."""
+    low_values, high_values = evaluate(low)[:, 0], evaluate(high)[:, 0]
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        here = evaluate(middle)[:, 0]
-        late = (np.abs(here - before) > np.abs(here - after)).any(axis=1)
-        low, high = np.where(late, low, middle), np.where(late, middle, high)
+        middle_values = evaluate(middle)[:, 0]
+        has_jumped = (np.abs(middle_values - low_values) > np.abs(middle_values - high_values)).any(axis=1)
+        low, high = np.where(has_jumped, low, middle), np.where(has_jumped, middle, high)
     return high
 
 
-def _distances(instants: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return how far instants are from the nearest of others, in their sequence; infinity if there are none."""
-    if not len(others):
+def _distances(instants: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """Return the distances of instants from the nearest of sorted targets; infinity if there are none."""
+    if not len(targets):
         return np.full(len(instants), np.inf)
-    after = np.minimum(np.searchsorted(others, instants), len(others) - 1)
-    return np.minimum(np.abs(others[after] - instants), np.abs(others[np.maximum(after - 1, 0)] - instants))
+    next_index = np.minimum(np.searchsorted(targets, instants), len(targets) - 1)
+    return np.minimum(np.abs(targets[next_index] - instants), np.abs(targets[np.maximum(next_index - 1, 0)] - instants))
 
 
 class _Cells(NamedTuple):
@@ -177,7 +177,7 @@ class _Cells(NamedTuple):
 
 
 def _unsettled_cells(evaluate: Evaluation, first: float, last: float, order: int) -> tuple[_Cells, bool]:
-    """Return the shortest stretches in which series from both ends do not agree, and whether all of them are short."""
+    """Return the shortest intervals in which series from both ends do not agree, and whether all of them are short."""
     duration = last - first
     nodes = np.linspace(first, last, LOOKS)
     values = evaluate(nodes)
@@ -186,16 +186,16 @@ def _unsettled_cells(evaluate: Evaluation, first: float, last: float, order: int
     cells = _Halved.at(nodes, values, CONSTANT * np.nan_to_num(position) * growth)
     blurred = 0.0
     while True:
-        gap, rest, terms, _, _ = meeting = _between(*cells[:4], order)
+        gap, remainders, terms, _, _ = meeting = _between(*cells[:4], order)
         slight = SLIGHT * np.maximum(terms, cells.sizes)
-        rough = (gap > CLEAR * rest + slight) | ((rest > RESOLVED * terms) & (rest > slight))
+        rough = (gap > CLEAR * remainders + slight) | ((remainders > RESOLVED * terms) & (remainders > slight))
         noise = (cells.noise >= LOST) & (cells.steps < STEPPED)
         noise = np.logical_or.accumulate(noise, axis=1)  # it grows with the order
         rough &= ~noise
-        known = np.isfinite(cells.left).all(axis=(1, 2)), np.isfinite(cells.right).all(axis=(1, 2))
-        some = rough.any(axis=(1, 2)) & known[0] & known[1]
+        is_known = np.isfinite(cells.left).all(axis=(1, 2)), np.isfinite(cells.right).all(axis=(1, 2))
+        is_rough = rough.any(axis=(1, 2)) & is_known[0] & is_known[1]
         blurred += np.sum((cells.high - cells.low)[noise[:, 0].any(axis=1)])
-        keep = cells.done | some | (known[0] ^ known[1])
+        keep = cells.done | is_rough | (is_known[0] ^ is_known[1])
         cells, rough = _Halved(*(x[keep] for x in cells)), rough[keep]
         width, tick = cells.high - cells.low, 4 * np.spacing(np.maximum(np.abs(cells.low), np.abs(cells.high)))
         cells.done[:] |= width <= np.maximum(SHORTEST * duration, tick)
@@ -223,13 +223,13 @@ class _Halved(NamedTuple):
     done: np.ndarray
 
     @classmethod
-    def at(cls, nodes: np.ndarray, values: np.ndarray, least: np.ndarray) -> "_Halved":
+    def at(cls, nodes: np.ndarray, values: np.ndarray, min_sizes: np.ndarray) -> "_Halved":
         """Return the cells between nodes."""
-        levels = len(least)
+        levels = len(min_sizes)
         nearby = np.nan_to_num(np.abs(values[:, :levels]), posinf=0.0)
         slopes = np.nan_to_num(np.abs(values[:, 1 : levels + 1]), posinf=0.0)  # of more terms, rounding is too large
         nearby += (nodes[1] - nodes[0]) * slopes
-        sizes = np.maximum(nearby[:-1] + nearby[1:], least / SLIGHT)
+        sizes = np.maximum(nearby[:-1] + nearby[1:], min_sizes / SLIGHT)
         count = np.zeros(sizes.shape, int)
         return cls(
             nodes[:-1], nodes[1:], values[:-1], values[1:], sizes, count, count.copy(), np.zeros(len(sizes), bool)
@@ -238,30 +238,30 @@ class _Halved(NamedTuple):
 
 def _halves(cells: _Halved, evaluate: Evaluation, rough: np.ndarray, meeting: tuple[np.ndarray, ...]) -> _Halved:
     """Return the halves of all cells that are not done, and the others, in the sequence of time."""
-    gap, rest, _, forth, back = meeting
+    gap, remainders, _, from_left, from_right = meeting
     middle = (cells.low + cells.high) / 2
-    between = np.full_like(cells.left, np.nan)
-    between[~cells.done] = evaluate(middle[~cells.done])
-    here = between[:, : gap.shape[1]]
-    nearer = np.minimum(np.abs(here - forth), np.abs(here - back))
-    clear = rough & (CLEAR * rest <= gap)
-    step, neither = clear & (nearer <= ONE_SIDE * gap), clear & (nearer > ONE_SIDE * gap)
-    hidden = neither & (cells.steps >= STEPPED) & ~np.logical_or.accumulate(step, axis=1)
-    lost = hidden.any(axis=(1, 2))  # that something jumps is known, rounding hides where
+    middle_values = np.full_like(cells.left, np.nan)
+    middle_values[~cells.done] = evaluate(middle[~cells.done])
+    middle_terms = middle_values[:, : gap.shape[1]]
+    nearer = np.minimum(np.abs(middle_terms - from_left), np.abs(middle_terms - from_right))
+    clear = rough & (CLEAR * remainders <= gap)
+    step, is_other = clear & (nearer <= ONE_SIDE * gap), clear & (nearer > ONE_SIDE * gap)
+    hidden = is_other & (cells.steps >= STEPPED) & ~np.logical_or.accumulate(step, axis=1)
+    is_lost = hidden.any(axis=(1, 2))  # something jumps there, but rounding hides the instant
     cells = cells._replace(
-        noise=np.where(neither, cells.noise + 1, 0),
-        steps=np.where(neither, 0, cells.steps + step),
-        done=cells.done | lost,
+        noise=np.where(is_other, cells.noise + 1, 0),
+        steps=np.where(is_other, 0, cells.steps + step),
+        done=cells.done | is_lost,
     )
-    split = np.flatnonzero(~cells.done)
+    open_cells = np.flatnonzero(~cells.done)
     firsts = cells._replace(
         high=np.where(cells.done, cells.high, middle),
-        right=np.where(cells.done[:, None, None], cells.right, between),
+        right=np.where(cells.done[:, None, None], cells.right, middle_values),
     )
-    seconds = _Halved(*(x[split] for x in cells._replace(low=middle, left=between)))
-    both = [np.concatenate(parts) for parts in zip(firsts, seconds, strict=True)]
-    sequence = np.argsort(both[0], kind="stable")
-    return _Halved(*(x[sequence] for x in both))
+    seconds = _Halved(*(x[open_cells] for x in cells._replace(low=middle, left=middle_values)))
+    arrays = [np.concatenate(pair) for pair in zip(firsts, seconds, strict=True)]
+    sequence = np.argsort(arrays[0], kind="stable")
+    return _Halved(*(x[sequence] for x in arrays))
 
 
 def _rows(cells: _Halved) -> _Cells:
@@ -274,10 +274,10 @@ def _rows(cells: _Halved) -> _Cells:
 
 
 def _between(low: np.ndarray, high: np.ndarray, left: np.ndarray, right: np.ndarray, order: int) -> tuple[Any, ...]:
-    """Return how far apart series from both ends of cells are in the middle, their last terms, sizes, and both."""
+    """Return the gaps between series from both ends of cells in the middle, their last terms, sizes, and both."""
     half = (high - low)[:, None] / 2
-    forth, back = (_series(values, step, order) for values, step in ((left, half), (right, -half)))
-    return np.abs(forth[0] - back[0]), forth[1] + back[1], forth[2] + back[2], forth[0], back[0]
+    first, second = (_series(values, step, order) for values, step in ((left, half), (right, -half)))
+    return np.abs(first[0] - second[0]), first[1] + second[1], first[2] + second[2], first[0], second[0]
 
 
 def _series(values: np.ndarray, step: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -301,27 +301,27 @@ class _Limits(NamedTuple):
 
 
 def _limits(evaluate: Evaluation, cells: _Cells, first: float, last: float) -> _Limits:
-    """Return how derivatives jump over stretches of time, by series from both sides that lead into their middle."""
+    """Return the jumps of derivatives over short intervals, by series from both sides that lead into their middle."""
     count, levels, joints = cells.sizes.shape
     if not count:
         return _Limits(np.zeros((0, levels, joints)), np.zeros((0, levels, joints)))
     middle, width = (cells.low + cells.high) / 2, cells.high - cells.low
-    nearest = np.maximum(0.75 * width, 4 * np.spacing(np.maximum(np.abs(cells.low), np.abs(cells.high))))
-    sides = int(np.ceil(np.log(FARTHEST * (last - first) / nearest.min()) / np.log(STRIDE))) + 1
-    offsets = nearest[:, None] * STRIDE ** np.arange(max(sides, FURTHER + 1.0))
-    before, after = (_limit(evaluate, middle, sign * offsets, cells.sizes, first, last) for sign in (-1.0, 1.0))
-    known = np.isfinite(before.value) & np.isfinite(after.value)
-    changes = np.where(known, after.value - before.value, 0.0)
-    slopes = np.where(known, np.abs(before.value) + np.abs(after.value), 0.0)[:, 1:]
-    error = MARGIN * (before.error + after.error) + SLIGHT * cells.sizes
+    min_offsets = np.maximum(0.75 * width, 4 * np.spacing(np.maximum(np.abs(cells.low), np.abs(cells.high))))
+    sides = int(np.ceil(np.log(FARTHEST * (last - first) / min_offsets.min()) / np.log(STRIDE))) + 1
+    offsets = min_offsets[:, None] * STRIDE ** np.arange(max(sides, FURTHER + 1.0))
+    left, right = (_limit(evaluate, middle, sign * offsets, cells.sizes, first, last) for sign in (-1.0, 1.0))
+    is_known = np.isfinite(left.value) & np.isfinite(right.value)
+    changes = np.where(is_known, right.value - left.value, 0.0)
+    slopes = np.where(is_known, np.abs(left.value) + np.abs(right.value), 0.0)[:, 1:]
+    error = MARGIN * (left.error + right.error) + SLIGHT * cells.sizes
     error[:, :-1] += 2 * width[:, None, None] * slopes
-    large = np.abs(changes) > error
-    shown = np.abs(after.nearest - before.nearest) / np.abs(changes)[:, None]
-    elsewhere = large & (shown < SHOWN[0]).all(axis=1)  # a jump that is not here
-    noisy = (shown > SHOWN[1]).all(axis=1)
-    large &= ~np.logical_or.accumulate(elsewhere, axis=1) & ~noisy
-    infinite = (np.isinf(before.value) & after.defined) | (np.isinf(after.value) & before.defined)
-    return _Limits(changes, np.where(infinite, np.inf, np.where(large, changes, 0.0)))
+    is_large = np.abs(changes) > error
+    ratio = np.abs(right.nearest - left.nearest) / np.abs(changes)[:, None]
+    elsewhere = is_large & (ratio < SHOWN[0]).all(axis=1)  # a jump that is not here
+    noisy = (ratio > SHOWN[1]).all(axis=1)
+    is_large &= ~np.logical_or.accumulate(elsewhere, axis=1) & ~noisy
+    infinite = (np.isinf(left.value) & right.defined) | (np.isinf(right.value) & left.defined)
+    return _Limits(changes, np.where(infinite, np.inf, np.where(is_large, changes, 0.0)))
 
 
 class _Side(NamedTuple):
@@ -338,38 +338,38 @@ def _limit(
 ) -> _Side:
     """Return the limits of derivatives at instants, by series from offsets to one side, the nearest of them first.
 
-    Near to what is singular, series have its rounding; far from it, they leave something out. The nearest ones that
+    Near a singular instant, series are inexact by rounding, and far from it by omitted terms. The nearest ones that
     agree count.
     """
     levels, joints = sizes.shape[1:]
-    at = middle[:, None] + offsets
-    within = (at >= first) & (at <= last) & (np.abs(offsets) <= np.maximum(FARTHEST * (last - first), offsets[:, :1]))
-    values = evaluate(np.clip(at, first, last).ravel())
-    values[~within.ravel()] = np.nan
-    leads = _series(values, -offsets.reshape(-1, 1), levels - 1)[0].reshape(*at.shape, levels, joints)
+    t = middle[:, None] + offsets
+    is_within = (t >= first) & (t <= last) & (np.abs(offsets) <= np.maximum(FARTHEST * (last - first), offsets[:, :1]))
+    values = evaluate(np.clip(t, first, last).ravel())
+    values[~is_within.ravel()] = np.nan
+    leads = _series(values, -offsets.reshape(-1, 1), levels - 1)[0].reshape(*t.shape, levels, joints)
     differ = np.abs(np.diff(leads, axis=1))
     larger = np.fmax(np.abs(leads[:, 1:]), np.abs(leads[:, :-1]))
     slight = SLIGHT / MARGIN * sizes[:, None]
     value, error = np.full_like(sizes, np.nan), np.zeros_like(sizes)
-    same = np.ones((*at.shape, joints), bool)  # sides with no other jump between, as lower derivatives show
+    linked = np.ones((*t.shape, joints), bool)  # sides with no other jump between, as lower derivatives show
     for level in range(levels):
-        for share in reversed(LIMITS):
-            pairs = (differ[:, :, level] <= share * larger[:, :, level] + slight[:, :, level]) & same[:, 1:]
+        for fraction in reversed(LIMITS):
+            pairs = (differ[:, :, level] <= fraction * larger[:, :, level] + slight[:, :, level]) & linked[:, 1:]
             agree = pairs[:, :-2] & pairs[:, 1:-1] & pairs[:, 2:]
-            which, some = np.argmax(agree, axis=1)[:, None], agree.any(axis=1)
+            column, has_limit = np.argmax(agree, axis=1)[:, None], agree.any(axis=1)
             spread = np.max(
-                [np.take_along_axis(differ[:, :, level], which + k, axis=1)[:, 0] for k in range(3)], axis=0
+                [np.take_along_axis(differ[:, :, level], column + k, axis=1)[:, 0] for k in range(3)], axis=0
             )
-            limit = np.take_along_axis(leads[:, :, level], which + 1, axis=1)[:, 0]
-            value[:, level] = np.where(some, limit, value[:, level])
-            error[:, level] = np.where(some, spread, error[:, level])
-        bound = MARGIN * error[:, level] + LIMITS[0] * np.abs(value[:, level]) + slight[:, 0, level]
-        same &= ~(np.abs(leads[:, :, level] - value[:, None, level]) > bound[:, None])
+            limit = np.take_along_axis(leads[:, :, level], column + 1, axis=1)[:, 0]
+            value[:, level] = np.where(has_limit, limit, value[:, level])
+            error[:, level] = np.where(has_limit, spread, error[:, level])
+        tolerance = MARGIN * error[:, level] + LIMITS[0] * np.abs(value[:, level]) + slight[:, 0, level]
+        linked &= ~(np.abs(leads[:, :, level] - value[:, None, level]) > tolerance[:, None])
     finite = np.isfinite(leads)
-    nearest = np.argmax(finite, axis=1)[:, None]
-    reach = np.minimum(nearest + np.arange(FURTHER).reshape(1, -1, 1, 1), leads.shape[1] - 1)
-    near = np.take_along_axis(leads, reach, axis=1)
-    grows = (near[:, :-1] / near[:, 1:] > GROWTH).all(axis=1) & (np.abs(near[:, 0]) > sizes)
+    first_finite = np.argmax(finite, axis=1)[:, None]
+    reach = np.minimum(first_finite + np.arange(FURTHER).reshape(1, -1, 1, 1), leads.shape[1] - 1)
+    near_values = np.take_along_axis(leads, reach, axis=1)
+    grows = (near_values[:, :-1] / near_values[:, 1:] > GROWTH).all(axis=1) & (np.abs(near_values[:, 0]) > sizes)
     value = np.where(np.isnan(value) & grows, np.inf, value)
-    defined = 2 * finite.all(axis=(2, 3)).sum(axis=1) > within.sum(axis=1)
-    return _Side(value, near[:, :LOST], error, defined[:, None, None])
+    defined = 2 * finite.all(axis=(2, 3)).sum(axis=1) > is_within.sum(axis=1)
+    return _Side(value, near_values[:, :LOST], error, defined[:, None, None])

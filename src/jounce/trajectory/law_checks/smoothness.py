@@ -105,16 +105,16 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     (2, [(3, 5, 0.0)])
     """
     whole_number("order", order, 0, HIGHEST)
-    instants, jumps, unknown = _jumps(law, first, last)
-    if unknown and last > first:
-        instants, jumps, unknown = _with_seen(law, instants, jumps, first, last, order)
+    instants, jumps, remark = _jumps(law, first, last)
+    if remark and last > first:
+        instants, jumps, remark = _with_seen(law, instants, jumps, first, last, order)
     repeats = getattr(law, "beyond", "") in ("repeat", "advance")
     if periodic:  # the end is the beginning, and counts once, at which the law begins again
-        near = SLACK * (last - first)
-        inside = (instants < last - near) & ((instants > first + near) | repeats)
-        instants, jumps = instants[inside], jumps[:, inside]
+        tolerance = SLACK * (last - first)
+        is_inside = (instants < last - tolerance) & ((instants > first + tolerance) | repeats)
+        instants, jumps = instants[is_inside], jumps[:, is_inside]
     if periodic and not repeats:
-        ends = [np.asarray(law(Jet.variable(np.asarray(at, float), HIGHEST)).derivatives()) for at in (last, first)]
+        ends = [np.asarray(law(Jet.variable(np.asarray(jump, float), HIGHEST)).derivatives()) for jump in (last, first)]
         rounding = SMOOTH * derivative_sizes(law, first, last, HIGHEST)
         # where a law has no derivatives at its ends, how they close is not known
         closing = np.where(np.abs(ends[1] - ends[0]) > rounding, ends[1] - ends[0], 0.0)
@@ -124,24 +124,24 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     summaries = []
     for level in range(highest_order + 1):
         sizes = np.abs(jumps[level])
-        where = int(np.argmax(sizes >= 0.999999 * sizes.max())) if sizes.any() else -1
-        at = (float(jumps[level, where]), float(instants[where])) if where >= 0 else (np.nan, np.nan)
-        summaries.append(DerivativeJumps(level, int(np.count_nonzero(sizes)), *at))
-    return Continuity(tuple(summaries), unknown)
+        index = int(np.argmax(sizes >= 0.999999 * sizes.max())) if sizes.any() else -1
+        jump = (float(jumps[level, index]), float(instants[index])) if index >= 0 else (np.nan, np.nan)
+        summaries.append(DerivativeJumps(level, int(np.count_nonzero(sizes)), *jump))
+    return Continuity(tuple(summaries), remark)
 
 
 def _with_seen(
     law: AbstractMotion, instants: np.ndarray, jumps: np.ndarray, first: float, last: float, order: int
 ) -> tuple[np.ndarray, np.ndarray, str]:
-    """Return known jumps with those that are seen, and what is not known."""
-    seen = observed_jumps([law], first, last, order + 1)
-    away = np.abs(seen.instants[:, None] - instants).min(axis=1, initial=np.inf)
-    new = away > SAME * (last - first)
-    sizes = np.zeros((len(jumps), np.count_nonzero(new)))
-    sizes[: seen.sizes.shape[1]] = seen.sizes[new, :, 0].T[: len(jumps)]
-    every, sizes = np.append(instants, seen.instants[new]), np.concatenate([jumps, sizes], axis=1)
-    sequence = np.argsort(every, kind="stable")
-    return every[sequence], sizes[:, sequence], LOOKED if seen.everywhere else TOO_FAST
+    """Return known and observed jumps, and a remark on what is not known."""
+    observed = observed_jumps([law], first, last, order + 1)
+    distances = np.abs(observed.instants[:, None] - instants).min(axis=1, initial=np.inf)
+    is_new = distances > SAME * (last - first)
+    sizes = np.zeros((len(jumps), np.count_nonzero(is_new)))
+    sizes[: observed.sizes.shape[1]] = observed.sizes[is_new, :, 0].T[: len(jumps)]
+    all_instants, sizes = np.append(instants, observed.instants[is_new]), np.concatenate([jumps, sizes], axis=1)
+    sequence = np.argsort(all_instants, kind="stable")
+    return all_instants[sequence], sizes[:, sequence], LOOKED if observed.everywhere else TOO_FAST
 
 
 def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, " knots"]:
@@ -219,7 +219,7 @@ def _jumps(
     law: AbstractMotion, first: float, last: float, order: int = HIGHEST, leader_values: LeaderValues | None = None
 ) -> tuple[np.ndarray, Float[np.ndarray, "levels knots"], str]:
     """Return the instants in an interval at which derivatives jump, the jumps, and a description of unknown ones."""
-    none, leader_values = (np.zeros(0), np.zeros((order + 1, 0))), leader_values or LeaderValues()
+    no_jumps, leader_values = (np.zeros(0), np.zeros((order + 1, 0))), leader_values or LeaderValues()
     match law:
         case OutputMotion() if law.parts:
             return _jumps(law.parts[0], first, last, order, leader_values)
@@ -227,8 +227,8 @@ def _jumps(
             following, leader = law.parts
             return _followed(following, leader, first, last, order, leader_values)
         case IntegratedMotion() if law.parts:
-            instants, sizes, unknown = _jumps(law.parts[0], first, last, max(order - 1, 0), leader_values)
-            return instants, np.concatenate([np.zeros((1, len(instants))), sizes])[: order + 1], unknown
+            instants, sizes, remark = _jumps(law.parts[0], first, last, max(order - 1, 0), leader_values)
+            return instants, np.concatenate([np.zeros((1, len(instants))), sizes])[: order + 1], remark
         case PiecewiseMotion() if law.parts:
             return _of_pieces(law, first, last, order)
         case SplineMotion():
@@ -237,7 +237,7 @@ def _jumps(
             return *_repeated(knot_jumps(law, order), start, float(law.stop), first, last, repeats=repeats), ""
         case AbstractProfile():
             return *_within(*_profile_jumps(law, order), first, last), ""
-    return *none, LOOKED if may_bend(law) else ""
+    return *no_jumps, LOOKED if may_bend(law) else ""
 
 
 def _repeated(
@@ -247,24 +247,24 @@ def _repeated(
     instants, sizes = jumps
     if repeats and len(instants):
         period = stop - start
-        since = np.arange(np.floor((first - start) / period), np.floor((last - start) / period) + 1)
-        since = since[: max(MOST_CROSSINGS // len(instants), 1)]
-        instants = (instants + period * since[:, None]).ravel()
-        sizes = np.tile(sizes, (1, len(since)))
+        periods = np.arange(np.floor((first - start) / period), np.floor((last - start) / period) + 1)
+        periods = periods[: max(MOST_CROSSINGS // len(instants), 1)]
+        instants = (instants + period * periods[:, None]).ravel()
+        sizes = np.tile(sizes, (1, len(periods)))
     return _within(instants, sizes, first, last)
 
 
 def _within(instants: np.ndarray, sizes: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
     slack = 1e-12 * max(abs(first), abs(last))
-    inside = (instants >= first - slack) & (instants <= last + slack)
-    return instants[inside], sizes[:, inside]
+    is_inside = (instants >= first - slack) & (instants <= last + slack)
+    return instants[is_inside], sizes[:, is_inside]
 
 
 def _profile_jumps(law: AbstractProfile, order: int) -> Jumps:
     """Return the jumps at the ends of a profile, which is symmetric up to the sign."""
     initial = np.asarray(law(Jet.variable(np.asarray(law.start_time, float), order)).dense().derivatives(), float)
-    least = ROUNDING * abs(law.end - law.start) / law.duration ** np.arange(order + 1)
-    initial = np.where(np.abs(initial) <= least, 0.0, initial)
+    threshold = ROUNDING * abs(law.end - law.start) / law.duration ** np.arange(order + 1)
+    initial = np.where(np.abs(initial) <= threshold, 0.0, initial)
     initial[0] = 0.0
     ends = np.array([law.start_time, law.stop_time], float)
     return ends, np.stack([initial, initial * (-1.0) ** np.arange(order + 1)], axis=1)
@@ -274,19 +274,19 @@ def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> t
     """Return the jumps between pieces, and the jumps of the pieces themselves."""
     law_jumps = [(*law.jumps(order), "")]
     bounded = law.beyond != "continue"
-    whole = (float(law.start), float(law.until[-1])) if bounded else (first, last)
+    domain = (float(law.start), float(law.until[-1])) if bounded else (first, last)
     inner = law.until[: len(law.parts) - 1]
-    begins, ends = (whole[0] if bounded else -np.inf, *inner), (*inner, whole[1] if bounded else np.inf)
-    for part, begin, end in zip(law.parts, begins, ends, strict=True):
-        if whole[0] < end and whole[1] > begin:
-            own, jumps, unknown = _jumps(part, max(whole[0], begin), min(whole[1], end), order)
-            within = (own > begin) & (own < end)
-            law_jumps.append((own[within], jumps[:, within], unknown))
-    parts = list(zip(*law_jumps, strict=True))
-    jumps = np.concatenate(parts[0]), np.concatenate(parts[1], axis=1)
+    begins, ends = (domain[0] if bounded else -np.inf, *inner), (*inner, domain[1] if bounded else np.inf)
+    for piece, begin, end in zip(law.parts, begins, ends, strict=True):
+        if domain[0] < end and domain[1] > begin:
+            piece_instants, jumps, remark = _jumps(piece, max(domain[0], begin), min(domain[1], end), order)
+            is_within = (piece_instants > begin) & (piece_instants < end)
+            law_jumps.append((piece_instants[is_within], jumps[:, is_within], remark))
+    columns = list(zip(*law_jumps, strict=True))
+    jumps = np.concatenate(columns[0]), np.concatenate(columns[1], axis=1)
     repeats = law.beyond in ("repeat", "advance")
-    within = _repeated(jumps, *whole, first, last, repeats=repeats)
-    return *within, "; ".join(dict.fromkeys(filter(None, parts[2])))
+    is_within = _repeated(jumps, *domain, first, last, repeats=repeats)
+    return *is_within, "; ".join(dict.fromkeys(filter(None, columns[2])))
 
 
 def _followed(
@@ -297,17 +297,17 @@ def _followed(
     The jump is a polynomial of the distance of the leader from the knot, so that its time derivatives follow from the
     jet of the leader at the passage.
     """
-    none = np.zeros(0), np.zeros((order + 1, 0))
-    own, _, unknown = _jumps(leader, first, last, order, leader_values)
-    if len(own):
-        unknown = LOOKED
+    no_jumps = np.zeros(0), np.zeros((order + 1, 0))
+    leader_instants, _, remark = _jumps(leader, first, last, order, leader_values)
+    if len(leader_instants):
+        remark = LOOKED
     if isinstance(law, SplineMotion) and not knot_jumps(law, order)[1].any():
-        return *none, unknown
+        return *no_jumps, remark
     looks = np.linspace(first, last, INTERVALS + 1)
     values = leader_values.coefficients(leader, looks)[0]
-    knots, jumps, less = _jumps(law, float(values.min()), float(values.max()), order, leader_values)
+    knots, jumps, law_remark = _jumps(law, float(values.min()), float(values.max()), order, leader_values)
     if not jumps.any():
-        return *none, unknown or less
+        return *no_jumps, remark or law_remark
     peaks = [np.abs(c).max(where=np.isfinite(c), initial=0.0) for c in leader_values.coefficients(leader, looks, order)]
     step = (last - first) / INTERVALS
     # the leader may begin or end at a knot, which it then passes outside the interval
@@ -315,18 +315,18 @@ def _followed(
     values = leader_values.coefficients(leader, looks)[0]
     jumping = jumps.any(axis=0)
     knots, jumps = knots[jumping], jumps[:, jumping]
-    which, crossing = _knots_between(values, knots)
-    if not len(which):
-        return *none, unknown or less
-    times = _crossings(leader, knots[which], looks[crossing], looks[crossing + 1], leader_values)
-    inside = (times > first - SLACK * step) & (times < last + SLACK * step)
-    sequence = np.flatnonzero(inside)[np.argsort(times[inside])]
-    which, crossing, times = which[sequence], crossing[sequence], np.clip(times[sequence], first, last)
-    passing = leader_values.coefficients(leader, times, order)
-    change = _composed(jumps[:, which], np.stack([0 * times, *passing[1:]]))  # exactly at the knot
-    bound = _composed(np.abs(jumps), np.stack([0.0, *peaks[1:]])[:, None])[:, which]
-    forward = np.where(values[crossing] < knots[which], 1.0, -1.0)
-    return times, np.where(np.abs(change) <= 1e-9 * bound, 0.0, forward * change), unknown or less
+    knot_index, cell = _knots_between(values, knots)
+    if not len(knot_index):
+        return *no_jumps, remark or law_remark
+    times = _crossings(leader, knots[knot_index], looks[cell], looks[cell + 1], leader_values)
+    is_inside = (times > first - SLACK * step) & (times < last + SLACK * step)
+    sequence = np.flatnonzero(is_inside)[np.argsort(times[is_inside])]
+    knot_index, cell, times = knot_index[sequence], cell[sequence], np.clip(times[sequence], first, last)
+    leader_jet = leader_values.coefficients(leader, times, order)
+    change = _composed(jumps[:, knot_index], np.stack([0 * times, *leader_jet[1:]]))  # exactly at the knot
+    bounds = _composed(np.abs(jumps), np.stack([0.0, *peaks[1:]])[:, None])[:, knot_index]
+    direction = np.where(values[cell] < knots[knot_index], 1.0, -1.0)
+    return times, np.where(np.abs(change) <= 1e-9 * bounds, 0.0, direction * change), remark or law_remark
 
 
 def _knots_between(
@@ -335,11 +335,11 @@ def _knots_between(
     """Return the knots between consecutive values, and the index of the value before; non-finite values pass none."""
     sequence = np.argsort(knots)
     low, high = np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
-    first, beyond = (np.searchsorted(knots[sequence], x, side="right") for x in (low, high))
-    count = np.where(np.isfinite(low) & np.isfinite(high), beyond - first, 0)
-    crossing = np.repeat(np.arange(len(count)), count)
-    offset = np.arange(len(crossing)) - np.repeat(np.cumsum(count) - count, count)
-    return sequence[first[crossing] + offset], crossing
+    start, stop = (np.searchsorted(knots[sequence], x, side="right") for x in (low, high))
+    count = np.where(np.isfinite(low) & np.isfinite(high), stop - start, 0)
+    cells = np.repeat(np.arange(len(count)), count)
+    offset = np.arange(len(cells)) - np.repeat(np.cumsum(count) - count, count)
+    return sequence[start[cells] + offset], cells
 
 
 def _composed(
@@ -361,25 +361,25 @@ def _crossings(
 
     Many instants are evaluated together: around the secant estimate, and evenly over the bracket.
     """
-    every, count = np.arange(len(knots)), len(AMONG) + 2 * len(CLOSE) + 1
+    columns, count = np.arange(len(knots)), len(AMONG) + 2 * len(CLOSE) + 1
 
     def distance(instants: np.ndarray) -> np.ndarray:
         return leader_values.coefficients(leader, instants.reshape(-1))[0].reshape(instants.shape) - knots
 
-    under, over = distance(low), distance(high)
-    below = under < 0
+    low_values, high_values = distance(low), distance(high)
+    starts_below = low_values < 0
     for _ in range(STEPS):
         width = high - low
         if (width <= 4 * np.spacing(np.maximum(np.abs(low), np.abs(high)))).all():
             break
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.nan_to_num(under / (under - over), nan=0.5, posinf=1.0, neginf=0.0)
-        near = np.clip(share + np.concatenate([-CLOSE, [0.0], CLOSE])[:, None], 0.0, 1.0)
-        shares = np.sort(np.concatenate([np.broadcast_to(AMONG[:, None], (len(AMONG), len(knots))), near]), axis=0)
-        instants = np.concatenate([low[None], low + shares * width, high[None]])
-        values = np.concatenate([under[None], distance(instants[1:-1]), over[None]])
-        before = (values[1:-1] < 0) == below
-        first = np.where(before.all(axis=0), count, np.argmin(before, axis=0))  # last before the passage
-        low, high = instants[first, every], instants[first + 1, every]
-        under, over = values[first, every], values[first + 1, every]
+            estimate = np.nan_to_num(low_values / (low_values - high_values), nan=0.5, posinf=1.0, neginf=0.0)
+        nearby = np.clip(estimate + np.concatenate([-CLOSE, [0.0], CLOSE])[:, None], 0.0, 1.0)
+        fractions = np.sort(np.concatenate([np.broadcast_to(AMONG[:, None], (len(AMONG), len(knots))), nearby]), axis=0)
+        instants = np.concatenate([low[None], low + fractions * width, high[None]])
+        values = np.concatenate([low_values[None], distance(instants[1:-1]), high_values[None]])
+        is_before = (values[1:-1] < 0) == starts_below
+        first = np.where(is_before.all(axis=0), count, np.argmin(is_before, axis=0))  # last before the passage
+        low, high = instants[first, columns], instants[first + 1, columns]
+        low_values, high_values = values[first, columns], values[first + 1, columns]
     return high

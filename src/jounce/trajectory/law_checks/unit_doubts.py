@@ -85,18 +85,18 @@ def _values(law: AbstractMotion, grid: Values) -> Values:
             values = law.expression.folded(float, {**parameters, "t": grid}.__getitem__, _operated)
         return np.broadcast_to(np.asarray(values, float), grid.shape)
     if isinstance(law, FollowingMotion) and law.parts:
-        own, leader = law.parts
-        plain = isinstance(leader, ExpressionMotion | FollowingMotion) or _is_polynomial(leader)
-        if not plain and _is_polynomial(own):  # it is followed from its beginning to its end, at some pace
-            return _spline_values(own, np.linspace(float(own.breakpoints[0]), float(own.stop), len(grid)))
-        return _values(own, _values(leader, grid))
+        path, leader = law.parts
+        is_exact = isinstance(leader, ExpressionMotion | FollowingMotion) or _is_polynomial(leader)
+        if not is_exact and _is_polynomial(path):  # it is followed from its beginning to its end, at some pace
+            return _spline_values(path, np.linspace(float(path.breakpoints[0]), float(path.stop), len(grid)))
+        return _values(path, _values(leader, grid))
     if isinstance(law, PiecewiseMotion) and law.parts and law.beyond == "continue":
-        piece = np.searchsorted(np.array(law.until, float), grid, side="right")
-        own = [grid[piece == k] for k in range(len(law.parts))]
-        return np.concatenate([_values(part, x) for part, x in zip(law.parts, own, strict=True) if len(x)])
+        index = np.searchsorted(np.array(law.until, float), grid, side="right")
+        path = [grid[index == k] for k in range(len(law.parts))]
+        return np.concatenate([_values(piece_law, x) for piece_law, x in zip(law.parts, path, strict=True) if len(x)])
     if isinstance(law, AbstractProfile):
-        share = np.clip((grid - float(law.start_time)) / float(law.duration), 0.0, 1.0)
-        return float(law.start) + (float(law.end) - float(law.start)) * share**2 * (3 - 2 * share)
+        fraction = np.clip((grid - float(law.start_time)) / float(law.duration), 0.0, 1.0)
+        return float(law.start) + (float(law.end) - float(law.start)) * fraction**2 * (3 - 2 * fraction)
     if _is_polynomial(law):
         return _spline_values(law, grid)
     if type(law) is FunctionMotion and (values := _of_all(law.function, grid)) is not None:
@@ -114,9 +114,9 @@ def _of_all(function: Callable[[Any], Any], grid: Values) -> Values | None:
     return values if values.shape == grid.shape else None
 
 
-def _operated(word: str, arguments: list[Any]) -> Any:
+def _operated(operation: str, arguments: list[Any]) -> Any:
     """Return the result of an operator or a function of expressions for NumPy arrays."""
-    return _OPERATIONS[word](*arguments) if word in _OPERATIONS else getattr(np, word)(*arguments)
+    return _OPERATIONS[operation](*arguments) if operation in _OPERATIONS else getattr(np, operation)(*arguments)
 
 
 def _is_polynomial(law: AbstractMotion) -> TypeGuard[SplineMotion]:
@@ -134,12 +134,12 @@ def _spline_values(law: SplineMotion, grid: Values) -> Values:
     elif law.beyond != "continue":
         grid = np.clip(grid, first, stop)
     grid = grid - turns * (stop - first)
-    piece = np.clip(np.searchsorted(begins, grid, side="right") - 1, 0, len(begins) - 1)
-    local, values = grid - begins[piece], np.zeros_like(grid)
+    index = np.clip(np.searchsorted(begins, grid, side="right") - 1, 0, len(begins) - 1)
+    local, values = grid - begins[index], np.zeros_like(grid)
     for power in np.asarray(law.coefficients, float)[::-1]:
-        values = values * local + power[piece]
+        values = values * local + power[index]
     if isinstance(law, SegmentedMotion):
-        amplitude, frequency, phase = np.asarray(law.sines, float)[:, piece]
+        amplitude, frequency, phase = np.asarray(law.sines, float)[:, index]
         values = values + amplitude * np.sin(local * frequency + phase)
     return values + turns * float(np.asarray(law.advance))
 
@@ -163,20 +163,20 @@ def degrees_meant(values: Values, lower: float | None = None, upper: float | Non
     ('', '')
     """
     low, high = float(values.min()), float(values.max())
-    largest = max(abs(low), abs(high))
+    peak = max(abs(low), abs(high))
     limit = max((abs(x) for x in (lower, upper) if x is not None), default=0.0)
-    if limit and largest <= max(OUTSIDE * limit, TURN):
+    if limit and peak <= max(OUTSIDE * limit, TURN):
         return ""
     if lower is not None and upper is not None:
         slack = math.degrees(SLACK * (upper - lower))
-        within = math.degrees(lower) - slack <= low and high <= math.degrees(upper) + slack
+        is_within = math.degrees(lower) - slack <= low and high <= math.degrees(upper) + slack
     else:
-        within = False
-    if not within and not (
+        is_within = False
+    if not is_within and not (
         (looks_like_degrees(low if -low > high else high) or _is_round(values)) and _is_position(values)
     ):
         return ""
-    turns = max(high - low, largest) / TURN
+    turns = max(high - low, peak) / TURN
     phrase = f"goes from {_round(low)} to {_round(high)} rad" if high > low else f"is {_round(low)} rad"
     return f"{phrase}, {turns:.2g} turns: degrees?"
 
@@ -189,10 +189,10 @@ def _is_round(values: Values) -> bool:
     """Return whether the peak of values is a whole or half number of rad between one and two turns."""
     sizes = np.abs(values)
     top = int(np.argmax(sizes))
-    left, largest, right = sizes[max(top - 1, 0)], sizes[top], sizes[min(top + 1, len(sizes) - 1)]
-    if 0 < top < len(sizes) - 1 and (bend := 2 * largest - left - right) > 0:
-        largest += (right - left) ** 2 / (8 * bend)
-    return bool(TURN < largest <= MANY_TURNS and abs(2 * largest - round(2 * largest)) <= NEAR)
+    left, peak, right = sizes[max(top - 1, 0)], sizes[top], sizes[min(top + 1, len(sizes) - 1)]
+    if 0 < top < len(sizes) - 1 and (bend := 2 * peak - left - right) > 0:
+        peak += (right - left) ** 2 / (8 * bend)
+    return bool(TURN < peak <= MANY_TURNS and abs(2 * peak - round(2 * peak)) <= NEAR)
 
 
 def _is_position(values: Values) -> bool:
@@ -215,8 +215,8 @@ def _is_position(values: Values) -> bool:
     if not fastest or max(fallen, risen) <= TURN:
         return False
     ends = bool(steps[0] <= AT_REST * fastest), bool(steps[-1] <= AT_REST * fastest)
-    still = steps <= ROUND * fastest
-    return all(ends) or float(still.mean()) >= DWELL
+    is_resting = steps <= ROUND * fastest
+    return all(ends) or float(is_resting.mean()) >= DWELL
 
 
 def trajectory_doubt(laws: dict[str, Any], first: float, last: float, limits: dict[str, Any]) -> str:
@@ -234,10 +234,10 @@ def trajectory_doubt(laws: dict[str, Any], first: float, last: float, limits: di
     doubts = {}
     for name, law in laws.items():
         values = values_of(law, first, last)
-        if values is not None and (why := degrees_meant(values, limits[name].lower, limits[name].upper)):
-            doubts[name] = why
+        if values is not None and (text := degrees_meant(values, limits[name].lower, limits[name].upper)):
+            doubts[name] = text
     if not doubts:
         return ""
-    name, why = next(iter(doubts.items()))
+    name, text = next(iter(doubts.items()))
     similar = f" (and {count - 1} joint{'s' if count > 2 else ''} like it)" if (count := len(doubts)) > 1 else ""
-    return f"{name} {why}{similar} A number without a unit is in SI; head the column '{name} [deg]', or convert to rad"
+    return f"{name} {text}{similar} A number without a unit is in SI; head the column '{name} [deg]', or convert to rad"

@@ -23,15 +23,15 @@ class CompositeLaw(AbstractMotion):
     parts: tuple[AbstractMotion, ...]
     recipe: Untraced = field(static=True)
 
-    def _take(self, parts: Sequence[Law], *rest: Any) -> None:
+    def _take(self, members: Sequence[Law], *arguments: Any) -> None:
         """Set the fields: the parts if their values are known, and the recipe."""
-        read = [Expression(part) if isinstance(part, str) else part for part in parts]
-        for k, part in enumerate(read):
-            if not isinstance(part, AbstractMotion | Expression):
-                raise TrajectoryError("must be a motion law, or an expression of t", name=f"[{k}]", value=part)
-        constant = all(_is_known(part) for part in read)
-        self.parts = tuple(with_values(part, {}) for part in read) if constant else ()
-        self.recipe = Untraced((tuple(read), *rest))
+        laws = [Expression(member) if isinstance(member, str) else member for member in members]
+        for k, member in enumerate(laws):
+            if not isinstance(member, AbstractMotion | Expression):
+                raise TrajectoryError("must be a motion law, or an expression of t", name=f"[{k}]", value=member)
+        constant = all(_is_known(member) for member in laws)
+        self.parts = tuple(with_values(member, {}) for member in laws) if constant else ()
+        self.recipe = Untraced((tuple(laws), *arguments))
 
     @property
     def is_open(self) -> bool:
@@ -121,13 +121,13 @@ class FollowingMotion(CompositeLaw):
         values = values[np.isfinite(values)]
         if not values.size:
             return None
-        least, most = float(values.min()), float(values.max())
+        low, high = float(values.min()), float(values.max())
         try:
-            law.check_instants(least, most)
+            law.check_instants(low, high)
         except JounceError as error:
-            words = f"its leader goes from {least:.9g} to {most:.9g}: of that coordinate in the place of the time, "
+            phrase = f"its leader goes from {low:.9g} to {high:.9g}: of that coordinate in the place of the time, "
             message = error.message.replace(" s, and the law", ", and the law")  # rad or m
-            raise type(error)(words + message, value=error.value) from None
+            raise type(error)(phrase + message, value=error.value) from None
 
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the law at the instants of the time jet."""
@@ -188,8 +188,8 @@ class OutputMotion(CompositeLaw):
 
     def check_instants(self, first: float, last: float) -> None:
         """Raise MechanismError if the law of the output is not defined at some instants."""
-        for part in self.parts:
-            part.check_instants(first, last)
+        for law in self.parts:
+            law.check_instants(first, last)
 
     def __call__(self, time: Jet) -> Jet:  # noqa: ARG002 - known only by solving
         """Raise TrajectoryError: the value is known only from a motion.

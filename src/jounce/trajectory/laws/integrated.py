@@ -84,20 +84,20 @@ class IntegratedMotion(CompositeLaw):
             message = f"must be a list of at most {order} values: the law and its derivatives below that one"
             raise TrajectoryError(message, name="initial", value=initial)
         values = [*initial, *(0.0,) * (order - len(initial))]
-        given = [number_or_expression(f"initial[{k}]", x) for k, x in enumerate(values)]
-        begin = number_or_expression("start", start)
-        inner = law if order == 1 else IntegratedMotion(law, order - 1, given[1:], begin)
-        self._take([inner], law, tuple(given), begin)
-        waiting = any(isinstance(x, Expression) for x in (*given, begin)) or not self.parts
-        self.initial, self.start = (None, None) if waiting else (given[0], begin)
+        initials = [number_or_expression(f"initial[{k}]", x) for k, x in enumerate(values)]
+        start_value = number_or_expression("start", start)
+        inner = law if order == 1 else IntegratedMotion(law, order - 1, initials[1:], start_value)
+        self._take([inner], law, tuple(initials), start_value)
+        waiting = any(isinstance(x, Expression) for x in (*initials, start_value)) or not self.parts
+        self.initial, self.start = (None, None) if waiting else (initials[0], start_value)
         self.breakpoints = self.halves = self.coefficients = None
         if waiting:
             self.parts = ()
             return
-        begin = jnp.asarray(begin, float)
-        begins, halves, powers = _panels(read_laws(self.parts[0]), jax.lax.stop_gradient(begin))
+        start_value = jnp.asarray(start_value, float)
+        begins, halves, powers = _panels(read_laws(self.parts[0]), jax.lax.stop_gradient(start_value))
         self.breakpoints, self.halves, self.coefficients = begins, halves, powers
-        self.initial = given[0] - _at(begins, halves, powers, begin)  # zero but for its slope by the start
+        self.initial = initials[0] - _at(begins, halves, powers, start_value)  # zero but for its slope by the start
 
     @property
     def is_open(self) -> bool:
@@ -108,8 +108,8 @@ class IntegratedMotion(CompositeLaw):
         """Return the law with numbers in the place of parameters."""
         if not self.is_open:
             return self
-        _, law, given, start = self.recipe.value
-        numbers = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in (*given, start)]
+        _, law, initial, start = self.recipe.value
+        numbers = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in (*initial, start)]
         if isinstance(law, str | Expression):
             law = with_values(parsed_value(law), parameters)
         else:
@@ -124,8 +124,8 @@ class IntegratedMotion(CompositeLaw):
         self.parts[0].check_instants(min(first, start), max(last, start))
         ends = float(self.breakpoints[0]), float(self.breakpoints[-1] + 2 * self.halves[-1])
         slack = SLACK * (last - first)
-        for instant, least, most in ((first, ends[0] - slack, np.inf), (last, -np.inf, ends[1] + slack)):
-            if not least <= instant <= most:
+        for instant, lower, upper in ((first, ends[0] - slack, np.inf), (last, -np.inf, ends[1] + slack)):
+            if not lower <= instant <= upper:
                 message = (
                     f"the law with this derivative is integrated from {ends[0]:.6g} to {ends[1]:.6g} s only, "
                     "as it varies so finely or has no value beyond; choose another start"
@@ -151,14 +151,14 @@ class IntegratedMotion(CompositeLaw):
 
 
 def _at(begins: Any, halves: Any, table: Any, instants: Any) -> Any:
-    piece = last_begun(begins, instants)
-    begin, half, powers = (x.at[..., piece].get(mode="promise_in_bounds") for x in (begins, halves, table))
-    u = (instants - begin) / half - 1.0
-    ahead = behind = jnp.zeros_like(u)  # Clenshaw recurrence
+    index = last_begun(begins, instants)
+    start, half, powers = (x.at[..., index].get(mode="promise_in_bounds") for x in (begins, halves, table))
+    u = (instants - start) / half - 1.0
+    b1 = b2 = jnp.zeros_like(u)  # Clenshaw recurrence
     for c in powers[:0:-1]:
-        ahead, behind = c + 2.0 * u * ahead - behind, ahead
-    inside = jnp.abs(u) <= 1.0 + 1e-6
-    return jnp.where(inside, powers[0] + u * ahead - behind, jnp.nan)
+        b1, b2 = c + 2.0 * u * b1 - b2, b1
+    is_inside = jnp.abs(u) <= 1.0 + 1e-6
+    return jnp.where(is_inside, powers[0] + u * b1 - b2, jnp.nan)
 
 
 @jax.jit
@@ -174,31 +174,31 @@ def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]
     coefficients : array of shape (degree + 2, panels)
         Coefficients of Chebyshev polynomials on the panels.
     """
-    lengths, fixed = jnp.asarray(NARROWED), jax.tree.map(jax.lax.stop_gradient, law)
+    lengths, constant_law = jnp.asarray(NARROWED), jax.tree.map(jax.lax.stop_gradient, law)
 
     def values(law: AbstractMotion, instants: Any) -> Any:
         flat = law(Jet([instants.reshape(-1)])).dense().coefficients[0]
         return jnp.broadcast_to(flat, instants.size).reshape(instants.shape)
 
     def panel(sign: Any, state: Any, _: Any) -> tuple[Any, Any]:
-        at, length, largest, total = state
-        distance = jnp.abs(at - start)
-        shortest = SHORTEST * jnp.maximum(jnp.abs(at), distance) + 1e-300
-        to_border = sign * (_next_border(fixed, at, sign, shortest) - at)
-        tried = jnp.minimum(jnp.minimum(2.0 * length, FIRST + WIDENED * distance) * lengths, to_border)
-        tried = jax.lax.stop_gradient(jnp.maximum(tried, shortest))
-        half = tried / 2.0
-        middle = at + sign * half
+        border, length, max_value, total = state
+        distance = jnp.abs(border - start)
+        min_length = SHORTEST * jnp.maximum(jnp.abs(border), distance) + 1e-300
+        to_border = sign * (_next_border(constant_law, border, sign, min_length) - border)
+        trials = jnp.minimum(jnp.minimum(2.0 * length, FIRST + WIDENED * distance) * lengths, to_border)
+        trials = jax.lax.stop_gradient(jnp.maximum(trials, min_length))
+        half = trials / 2.0
+        middle = border + sign * half
         nodes = middle[:, None] + half[:, None] * _ABSCISSAS
-        samples = values(fixed, nodes)
+        samples = values(constant_law, nodes)
         fitted = samples[:, : DEGREE + 1] @ _FITTED.T
-        sizes = jnp.maximum(largest, jnp.max(jnp.abs(samples), axis=1))
-        off = jnp.max(jnp.abs(samples[:, DEGREE + 1 :] - fitted @ _SEEN.T), axis=1)
-        finite = jnp.isfinite(off)
-        noise = 4.0 * jnp.min(jnp.where(finite, off, jnp.inf))  # not resolved by shorter panels, either
-        fine = off <= jnp.maximum(RESOLVED * sizes, jnp.minimum(noise, ROUNDING * sizes))
-        own = jnp.max(jnp.abs(samples), axis=1)
-        jumps = (tried <= shortest) & finite & (own <= STEEPER * jnp.maximum(own[0], largest))  # not a pole
+        sizes = jnp.maximum(max_value, jnp.max(jnp.abs(samples), axis=1))
+        errors = jnp.max(jnp.abs(samples[:, DEGREE + 1 :] - fitted @ _SEEN.T), axis=1)
+        finite = jnp.isfinite(errors)
+        noise = 4.0 * jnp.min(jnp.where(finite, errors, jnp.inf))  # not resolved by shorter panels, either
+        fine = errors <= jnp.maximum(RESOLVED * sizes, jnp.minimum(noise, ROUNDING * sizes))
+        peaks = jnp.max(jnp.abs(samples), axis=1)
+        jumps = (trials <= min_length) & finite & (peaks <= STEEPER * jnp.maximum(peaks[0], max_value))  # not a pole
         fine = finite & (fine | jumps)
         any_fine = jnp.any(fine)
         pick = jnp.where(any_fine, jnp.argmax(fine), len(NARROWED) - 1)
@@ -206,13 +206,13 @@ def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]
         chosen = values(law, jnp.where(any_fine, nodes[pick, : DEGREE + 1], start))
         raised = (_FITTED @ chosen) @ _RAISED.T * half[pick]
         gain = jnp.sum(raised)  # at the right end, where every polynomial is 1
-        begin = jnp.where(sign > 0, at, at - tried[pick])
-        before = jnp.where(sign > 0, total, total - gain)
-        end = jnp.where(any_fine, at + sign * tried[pick], at)
-        after = jnp.where(any_fine, total + sign * gain, total)
-        accepted = jnp.where(any_fine, raised.at[0].add(before), 0.0), jnp.where(any_fine, half[pick], 0.0)
-        size = jnp.where(any_fine, sizes[pick], largest)
-        return (end, tried[pick], size, after), (jnp.where(any_fine, begin, at), *accepted)
+        panel_start = jnp.where(sign > 0, border, border - trials[pick])
+        start_integral = jnp.where(sign > 0, total, total - gain)
+        end = jnp.where(any_fine, border + sign * trials[pick], border)
+        next_total = jnp.where(any_fine, total + sign * gain, total)
+        panel_values = jnp.where(any_fine, raised.at[0].add(start_integral), 0.0), jnp.where(any_fine, half[pick], 0.0)
+        size = jnp.where(any_fine, sizes[pick], max_value)
+        return (end, trials[pick], size, next_total), (jnp.where(any_fine, panel_start, border), *panel_values)
 
     state = start, jnp.asarray(FIRST), jnp.zeros(()), jnp.zeros(())
 
@@ -224,26 +224,26 @@ def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]
     return jax.lax.stop_gradient(begins), jax.lax.stop_gradient(halves), powers.T
 
 
-def _next_border(law: AbstractMotion, at: Any, sign: Any, least: Any) -> Any:
+def _next_border(law: AbstractMotion, instant: Any, sign: Any, min_distance: Any) -> Any:
     """Return the next instant at which pieces of a law meet; infinite if none is known."""
     if isinstance(law, IntegratedMotion):
-        return _next_border(law.parts[0], at, sign, least)
+        return _next_border(law.parts[0], instant, sign, min_distance)
     if isinstance(law, PiecewiseMotion):
         ends = [*([] if law.start is None else [law.start]), *law.until]
         borders, repeats = jnp.stack([jnp.asarray(x, float) for x in ends]) if ends else None, law.beyond
-        inner = [_next_border(part, at, sign, least) for part in law.parts if law.beyond == "continue"]
+        inner = [_next_border(piece, instant, sign, min_distance) for piece in law.parts if law.beyond == "continue"]
     elif isinstance(law, SplineMotion):
         borders = jnp.append(jnp.asarray(law.breakpoints, float), jnp.asarray(law.stop, float))
         repeats, inner = law.beyond, []
     else:
         return sign * jnp.inf
-    inside = [sign * x for x in inner]
+    candidates = [sign * x for x in inner]
     if borders is not None:
         shift = 0.0
         if repeats in ("repeat", "advance"):
             period = borders[-1] - borders[0]
-            shift = jnp.floor((at + sign * 2 * least - borders[0]) / period) * period
+            shift = jnp.floor((instant + sign * 2 * min_distance - borders[0]) / period) * period
             borders = jnp.concatenate([borders[:1] - period, borders, borders[-1:] + period])
-        ahead = sign * (borders + shift - at)
-        inside.append(jnp.min(jnp.where(ahead > 2 * least, ahead, jnp.inf)) + sign * at)
-    return sign * functools.reduce(jnp.minimum, inside, jnp.inf)
+        distances = sign * (borders + shift - instant)
+        candidates.append(jnp.min(jnp.where(distances > 2 * min_distance, distances, jnp.inf)) + sign * instant)
+    return sign * functools.reduce(jnp.minimum, candidates, jnp.inf)

@@ -75,35 +75,35 @@ class PiecewiseMotion(CompositeLaw):
         if not bounded and (start is not None or beyond != BEYOND[0]):
             name, value = ("beyond", beyond) if beyond != BEYOND[0] else ("start", start)
             raise TrajectoryError("the last law has no end; say until when it goes", name=name, value=value)
-        begin = number_or_expression("start", 0.0 if start is None else start) if bounded else None
-        borders = [begin, *ends] if bounded else ends
+        first = number_or_expression("start", 0.0 if start is None else start) if bounded else None
+        borders = [first, *ends] if bounded else ends
         self.beyond = beyond if bounded else "continue"
         self._take(laws, tuple(ends), start, beyond)
         if any(isinstance(x, Expression) for x in borders):
             self.parts, self.until, self.start, self.advance = (), (), None, None
             return
         if not any(isinstance(x, Tracer) for x in borders) and (np.diff(borders) <= 0).any():
-            if bounded and ends[0] <= begin and (np.diff(ends) > 0).all():
+            if bounded and ends[0] <= first and (np.diff(ends) > 0).all():
                 message = "the first law must end after it begins; give start, which is 0 unless given"
                 raise TrajectoryError(message, name="until[0]", value=ends[0])
             raise TrajectoryError("must increase", name="until", value=ends)
-        self.until, self.start = tuple(ends), begin
+        self.until, self.start = tuple(ends), first
         self.advance = self._gain() if bounded and self.parts and beyond in ("repeat", "advance") else None
 
     def _gain(self) -> Any:
         """Return the gain of the law over a repetition."""
-        first, last = (
-            part(Jet([jnp.asarray(at, float)])).coefficients[0]
-            for part, at in ((self.parts[0], self.start), (self.parts[-1], self.until[-1]))
+        start_value, end_value = (
+            law(Jet([jnp.asarray(instant, float)])).coefficients[0]
+            for law, instant in ((self.parts[0], self.start), (self.parts[-1], self.until[-1]))
         )
-        gain = last - first
+        gain = end_value - start_value
         if self.beyond == "advance" or is_traced(gain):
             return gain if self.beyond == "advance" else jnp.zeros_like(gain)
         gain = float(gain)
-        largest = float(np.max([size[0] for size in self._sizes(0)]))
-        if not abs(gain) <= CLOSED * largest:
+        peak = float(np.max([size[0] for size in self._sizes(0)]))
+        if not abs(gain) <= CLOSED * peak:
             message = f"do not end where they begin, but {gain:.6g} from there; close them, or choose beyond: advance"
-            raise TrajectoryError(message, name="laws", value=float(last))
+            raise TrajectoryError(message, name="laws", value=float(end_value))
         return 0.0
 
     @property
@@ -125,12 +125,12 @@ class PiecewiseMotion(CompositeLaw):
             start, stop = float(self.start), float(self.until[-1])
             if self.beyond == "refuse":
                 check_within(first, last, start, stop, "laws")
-            whole = self.beyond == "repeat" or self.beyond == "advance"
-            first, last = (start, stop) if whole else np.clip((first, last), start, stop).tolist()
+            repeats = self.beyond == "repeat" or self.beyond == "advance"
+            first, last = (start, stop) if repeats else np.clip((first, last), start, stop).tolist()
         begins, ends = self._borders()
-        for part, begin, end in zip(self.parts, begins, ends, strict=True):
-            if first < end and last >= begin:
-                part.check_instants(max(first, begin), min(last, end))
+        for law, start_, end in zip(self.parts, begins, ends, strict=True):
+            if first < end and last >= start_:
+                law.check_instants(max(first, start_), min(last, end))
 
     def _borders(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """Return the beginning and the end of each law; the first and the last are unbounded."""
@@ -140,9 +140,9 @@ class PiecewiseMotion(CompositeLaw):
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the law at the instants of the time jet; parameters need values, see `resolved`."""
         self._known_parts()
-        where = self.until, self.start, time.coefficients[0]
-        if self.beyond == "refuse" and np.ndim(self.start) == 0 and not is_traced(where) and np.size(where[2]):
-            self.check_instants(float(np.min(where[2])), float(np.max(where[2])))
+        values = self.until, self.start, time.coefficients[0]
+        if self.beyond == "refuse" and np.ndim(self.start) == 0 and not is_traced(values) and np.size(values[2]):
+            self.check_instants(float(np.min(values[2])), float(np.max(values[2])))
         mode = "repeat" if self.beyond == "advance" else self.beyond
         stop = self.until[-1] if self.beyond != "continue" else None
         return continued(self._within, time, self.start, stop, mode, 0.0 if self.advance is None else self.advance)
@@ -151,12 +151,12 @@ class PiecewiseMotion(CompositeLaw):
         instants = time.coefficients[0]
         begins, ends = self._borders()
         value: tuple[Any, ...] = ()
-        for part, begin, end in zip(self.parts, begins, ends, strict=True):
-            own = (instants >= begin) & (instants < end)
+        for law, start, end in zip(self.parts, begins, ends, strict=True):
+            is_own = (instants >= start) & (instants < end)
             # outside its piece, a law may be undefined: it is evaluated at an instant of the piece
-            some = jnp.clip(instants, begin, jnp.where(jnp.isinf(begin), end, begin))
-            coefficients = part(Jet((jnp.where(own, instants, some), *time.coefficients[1:]))).dense().coefficients
-            value = tuple(jnp.where(own, f, v) for f, v in zip(coefficients, value or coefficients, strict=True))
+            inner = jnp.clip(instants, start, jnp.where(jnp.isinf(start), end, start))
+            coefficients = law(Jet((jnp.where(is_own, instants, inner), *time.coefficients[1:]))).dense().coefficients
+            value = tuple(jnp.where(is_own, f, v) for f, v in zip(coefficients, value or coefficients, strict=True))
         return Jet(value)
 
     def jumps(self, order: int = 4) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "{order}+1 knots"]]:
@@ -180,27 +180,27 @@ class PiecewiseMotion(CompositeLaw):
         >>> jn.laws.PiecewiseMotion(["t**3", "0"], until=[0.0]).jumps(3)[1][:, 0].tolist()
         [0.0, 0.0, 0.0, -6.0]
         """
-        parts = self._known_parts()
-        pairs = list(zip(self.until, parts, parts[1:], strict=False))
+        laws = self._known_parts()
+        pairs = list(zip(self.until, laws, laws[1:], strict=False))
         sizes = self._sizes(order) if self.until else []
-        rest = np.zeros(order + 1)
-        instants = [at for at, *_ in pairs]
+        zeros = np.zeros(order + 1)
+        instants = [time for time, *_ in pairs]
         jumps = [
-            _jump(_derivatives(left, at, order), _derivatives(right, at, order), np.maximum(*sizes[k : k + 2]))
-            for k, (at, left, right) in enumerate(pairs)
+            _jump(_derivatives(left, time, order), _derivatives(right, time, order), np.maximum(*sizes[k : k + 2]))
+            for k, (time, left, right) in enumerate(pairs)
         ]
         if self.beyond in ("hold", "repeat", "advance"):
-            begin, end = _derivatives(parts[0], self.start, order), _derivatives(parts[-1], self.until[-1], order)
-            own = rest.copy()
-            own[0] = begin[0]
+            first, last = _derivatives(laws[0], self.start, order), _derivatives(laws[-1], self.until[-1], order)
+            held = zeros.copy()
+            held[0] = first[0]
             if self.beyond == "hold":
-                stop = rest.copy()
-                stop[0] = end[0]
+                held_end = zeros.copy()
+                held_end[0] = last[0]
                 instants = [self.start, *instants, self.until[-1]]
-                jumps = [_jump(own, begin, sizes[0]), *jumps, _jump(end, stop, sizes[-1])]
+                jumps = [_jump(held, first, sizes[0]), *jumps, _jump(last, held_end, sizes[-1])]
             else:
-                end[0] -= float(self.advance)
-                instants, jumps = [self.start, *instants], [_jump(end, begin, np.maximum(sizes[0], sizes[-1])), *jumps]
+                last[0] -= float(self.advance)
+                instants, jumps = [self.start, *instants], [_jump(last, first, np.maximum(sizes[0], sizes[-1])), *jumps]
         return np.array(instants, float), np.stack(jumps, axis=-1) if jumps else np.zeros((order + 1, 0))
 
     def _sizes(self, order: int) -> list[Float[np.ndarray, " levels"]]:
@@ -212,12 +212,12 @@ class PiecewiseMotion(CompositeLaw):
             lengths = np.diff(ends) if len(ends) > 1 else [abs(ends[0]) or 1.0]
             borders = [ends[0] - lengths[0], *ends, ends[-1] + lengths[-1]]
         sizes = []
-        for part, begin, end in zip(self._known_parts(), borders, borders[1:], strict=False):
+        for law, start, end in zip(self._known_parts(), borders, borders[1:], strict=False):
             try:
-                sizes.append(derivative_sizes(part, begin, end, order))
+                sizes.append(derivative_sizes(law, start, end, order))
             except MechanismError:  # samples that end before: the derivatives at the knot are known
-                instant = begin if begin == ends[-1] else end
-                sizes.append(derivative_sizes(part, instant, instant, order))
+                instant = start if start == ends[-1] else end
+                sizes.append(derivative_sizes(law, instant, instant, order))
         return sizes
 
 

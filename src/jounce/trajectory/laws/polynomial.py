@@ -185,8 +185,8 @@ class PolynomialMotion(SplineMotion):
         """Values of the m-th derivative at the knots, shape (knots,): ``q^(m)_i`` of Negrean 2025, equation 61."""
         m = self.continuity
         first, slope = math.factorial(m) * self.coefficients[m], math.factorial(m + 1) * self.coefficients[m + 1]
-        last = first[-1] + slope[-1] * (self.stop - self.breakpoints[-1])
-        return np.append(first, last)
+        final = first[-1] + slope[-1] * (self.stop - self.breakpoints[-1])
+        return np.append(first, final)
 
     def integration_constants(self, origin: float = 0.0) -> Float[np.ndarray, "continuity segments"]:
         """Return the integration constants ``a_k`` of the segments (Negrean 2025, equations 61-63).
@@ -212,17 +212,17 @@ class PolynomialMotion(SplineMotion):
         >>> law.integration_constants().round(12).tolist()  # q = (1 - t)^3 / 3 + t^3 / 3 + a_1 t + a_2
         [[1.0], [4.666666666667]]
         """
-        m, knots, highest = self.continuity, self.knots, self.knot_values
-        length, beginning = np.diff(knots), knots[:-1] - origin
-        rest = []
+        m, knots, knot_values = self.continuity, self.knots, self.knot_values
+        length, starts = np.diff(knots), knots[:-1] - origin
+        remainders = []
         for k in range(m):  # part of each power of the local time that is not in the term of the left knot value
             contribution = (
-                (-1) ** (m + k) * math.comb(m + 1, k) / math.factorial(m + 1) * length ** (m - k) * highest[:-1]
+                (-1) ** (m + k) * math.comb(m + 1, k) / math.factorial(m + 1) * length ** (m - k) * knot_values[:-1]
             )
-            rest.append(self.coefficients[k] - contribution)
+            remainders.append(self.coefficients[k] - contribution)
         constants = []
         for power in range(m - 1, -1, -1):  # with local time tau - beginning, powers of tau by the binomial sum
-            shifted = [rest[k] * math.comb(k, power) * (-beginning) ** (k - power) for k in range(power, m)]
+            shifted = [remainders[k] * math.comb(k, power) * (-starts) ** (k - power) for k in range(power, m)]
             constants.append(math.factorial(power) * sum(shifted[1:], shifted[0]))
         return np.stack(constants)
 
@@ -276,31 +276,31 @@ def _spline(
     """Return the local Taylor coefficients, shape (degree + 1, segments), of a spline through values at knots."""
     from scipy.interpolate import make_interp_spline  # local, since the import of SciPy takes half a second
 
-    needed, given = degree - 1, len(conditions[0]) + len(conditions[1])
-    if given not in (0, needed):
-        message = f"{needed} conditions on the derivatives above that of the knots close the system, or none"
-        raise TrajectoryError(f"{message}; give as many in start and end together", value=given)
-    first, last = (needed + 1) // 2, needed // 2
+    required, count = degree - 1, len(conditions[0]) + len(conditions[1])
+    if count not in (0, required):
+        message = f"{required} conditions on the derivatives above that of the knots close the system, or none"
+        raise TrajectoryError(f"{message}; give as many in start and end together", value=count)
+    first, last = (required + 1) // 2, required // 2
     _check_shares(conditions, len(knots) - 1, (first, last))
-    if not given and ends == "not-a-knot":
+    if not count and ends == "not-a-knot":
         if len(knots) <= degree:
             message = f"not-a-knot ends of a law of this degree need at least {degree + 1} knots"
             raise TrajectoryError(f"{message}; give more, or conditions at the start and the end", value=len(knots))
-        inside = knots[1 + first : len(knots) - 1 - last]
+        inner_knots = knots[1 + first : len(knots) - 1 - last]
         bounds = [np.full(degree + 1, knot) for knot in (knots[0], knots[-1])]
         try:
-            spline = make_interp_spline(knots, values, k=degree, t=np.concatenate([bounds[0], inside, bounds[1]]))
+            spline = make_interp_spline(knots, values, k=degree, t=np.concatenate([bounds[0], inner_knots, bounds[1]]))
         except (np.linalg.LinAlgError, ValueError):
             message = "no spline goes through the samples: their spacing is too uneven; sample evenly"
             raise TrajectoryError(message, value=float(np.diff(knots).min())) from None
     else:
-        if not given:
+        if not count:
             top = degree if ends == "natural" else 0
             start, end = (dict.fromkeys((abs(top - k) for k in range(1, n + 1)), 0.0) for n in (first, last))
             conditions = start, end
-        both = [sorted(end.items()) or None for end in conditions] if needed else [None, None]
+        bc_types = [sorted(end.items()) or None for end in conditions] if required else [None, None]
         try:
-            spline = make_interp_spline(knots, values, k=degree, bc_type=tuple(both))
+            spline = make_interp_spline(knots, values, k=degree, bc_type=tuple(bc_types))
         except (np.linalg.LinAlgError, ValueError):
             orders = [sorted(end) for end in conditions]
             message = "the conditions at the start and the end do not determine the law; choose others"
@@ -312,57 +312,57 @@ def _spline(
 
 def _check_shares(conditions: _Ends, segments: int, shares: tuple[int, int]) -> None:
     """Raise TrajectoryError if one end has more conditions than the other, by more than one."""
-    start, end = (len(given) for given in conditions)
+    start, end = (len(end_conditions) for end_conditions in conditions)
     if segments == 1 or abs(start - end) <= 1:
         return
-    more, fewer = shares
-    some = f"{more} at each end" if more == fewer else f"{more} at one end and {fewer} at the other"
+    larger, smaller = shares
+    phrase = f"{larger} at each end" if larger == smaller else f"{larger} at one end and {smaller} at the other"
     message = (
         f"of the conditions on the derivatives above that of the knots, {start} are at the start and {end} at the end: "
         "an error at one end, of rounding as well, then grows by a factor at every knot, and the law with it"
     )
-    raise TrajectoryError(f"{message}; give {some}, or none", name="start" if start > end else "end")
+    raise TrajectoryError(f"{message}; give {phrase}, or none", name="start" if start > end else "end")
 
 
 def _check_growth(
     pieces: _Pieces, knots: Float[np.ndarray, " knots"], values: Float[np.ndarray, " knots"], conditions: _Ends
 ) -> None:
     """Raise TrajectoryError unless a spline passes through its own knots and stays near them."""
-    given = [abs(value) for end in conditions for value in end.values()]
-    size = max(float(np.max(np.abs(values))), *given, 0.0)
+    sizes = [abs(value) for end in conditions for value in end.values()]
+    size = max(float(np.max(np.abs(values))), *sizes, 0.0)
     local = np.diff(knots) * (np.arange(1, SAMPLES + 1) / SAMPLES)[:, None]
-    along = sum(c * local**k for k, c in enumerate(pieces))
-    missed = float(np.max(np.abs(np.asarray(along)[-1] - values[1:])))
+    curve = sum(c * local**k for k, c in enumerate(pieces))
+    missed = float(np.max(np.abs(np.asarray(curve)[-1] - values[1:])))
     if not missed <= AT_KNOTS * size:
         message = f"the law misses the values at its own knots, by {missed:.3g}: errors grow from knot to knot"
-    elif not np.max(np.abs(along)) <= LARGEST_GROWTH * size:
-        message = f"the law grows to {np.max(np.abs(along)):.3g} between its knots, of which the largest is {size:.3g}"
+    elif not np.max(np.abs(curve)) <= LARGEST_GROWTH * size:
+        message = f"the law grows to {np.max(np.abs(curve)):.3g} between its knots, of which the largest is {size:.3g}"
     else:
         return
-    smallest = float(np.min(np.diff(knots)) * (len(knots) - 1) / (knots[-1] - knots[0]))
+    shortest = float(np.min(np.diff(knots)) * (len(knots) - 1) / (knots[-1] - knots[0]))
     advice = "sample evenly, lower the order of continuity, or choose an even number of conditions, half at each end"
-    raise TrajectoryError(f"{message} (the shortest segment is {smallest:.2g} of the mean one); {advice}")
+    raise TrajectoryError(f"{message} (the shortest segment is {shortest:.2g} of the mean one); {advice}")
 
 
 def _closing(pieces: _Pieces, knots: Float[np.ndarray, " knots"], constants: _Ends, duration: float) -> _Pieces:
     """Return the polynomial of the integration constants, as local Taylor coefficients of the shape of the pieces."""
-    count, length, last = len(constants[0]) + len(constants[1]), knots[-1], knots[-1] - knots[-2]
+    count, length, step = len(constants[0]) + len(constants[1]), knots[-1], knots[-1] - knots[-2]
     rows, values = [], []
     for index, conditions in enumerate(constants):
         for order, value in conditions.items():
-            reached = pieces[order, 0] * math.factorial(order)
+            current = pieces[order, 0] * math.factorial(order)
             if index:
-                reached = sum(
-                    c * math.perm(k, order) * last ** (k - order) for k, c in enumerate(pieces[:, -1]) if k >= order
+                current = sum(
+                    c * math.perm(k, order) * step ** (k - order) for k, c in enumerate(pieces[:, -1]) if k >= order
                 )
             rows.append([float(math.perm(j, order) * (index or j == order)) for j in range(count)])
-            values.append(value * duration**order - reached * length**order)
+            values.append(value * duration**order - current * length**order)
     if np.linalg.matrix_rank(np.array(rows)) < count:
         message = "these conditions do not fix the constants of integration; one at least must be on the position"
         raise TrajectoryError(message, value=[sorted(end) for end in constants])
     powers = np.linalg.solve(np.array(rows), np.array(values))
-    at = knots[:-1] / length
+    offsets = knots[:-1] / length
     closing = np.zeros_like(pieces)
     for k in range(count):
-        closing[k] = sum(powers[j] * math.comb(j, k) * at ** (j - k) for j in range(k, count)) / length**k
+        closing[k] = sum(powers[j] * math.comb(j, k) * offsets ** (j - k) for j in range(k, count)) / length**k
     return closing

@@ -55,18 +55,18 @@ class AbstractProfile(AbstractMotion):
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the law at the instants of the time jet."""
         instants = time.coefficients[0]
-        late = 2 * (instants - self.start_time) >= self.duration
-        moving = (instants >= self.start_time) & (instants < self.stop_time)
+        is_late = 2 * (instants - self.start_time) >= self.duration
+        is_moving = (instants >= self.start_time) & (instants < self.stop_time)
         # time counts from the nearer end, so that rest is exact at both; outside, from that end itself
-        forward, backward = (time - self.start_time) / self.duration, (self.stop_time - time) / self.duration
-        both = zip(forward.dense().coefficients, backward.dense().coefficients, strict=True)
-        near = Jet(jnp.where(late, b, f) for f, b in both)
-        near = Jet((jnp.where(moving, near.coefficients[0], 0.0), *near.coefficients[1:]))
-        half = self.first_half(near).dense().coefficients
+        elapsed, remaining = (time - self.start_time) / self.duration, (self.stop_time - time) / self.duration
+        pairs = zip(elapsed.dense().coefficients, remaining.dense().coefficients, strict=True)
+        nearer = Jet(jnp.where(is_late, b, f) for f, b in pairs)
+        nearer = Jet((jnp.where(is_moving, nearer.coefficients[0], 0.0), *nearer.coefficients[1:]))
+        half = self.first_half(nearer).dense().coefficients
         distance = jnp.asarray(self.end - self.start)
-        signed = jnp.where(late, -distance, distance)
-        value = jnp.where(late, self.end, self.start) + jnp.where(moving, signed * half[0], 0.0)
-        return Jet((value, *(jnp.where(moving, signed * c, 0.0) for c in half[1:])))
+        signed = jnp.where(is_late, -distance, distance)
+        value = jnp.where(is_late, self.end, self.start) + jnp.where(is_moving, signed * half[0], 0.0)
+        return Jet((value, *(jnp.where(is_moving, signed * c, 0.0) for c in half[1:])))
 
 
 class RestToRestMotion(AbstractProfile):
@@ -133,8 +133,8 @@ def rest_to_rest_powers(rest: int) -> list[float]:
 def _largest(law: np.polynomial.Polynomial) -> float:
     """Return the largest absolute value on [0, 1/2], which suffices by symmetry."""
     roots = law.deriv().roots()
-    inside = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0) & (roots.real < 0.5)]
-    return float(np.abs(law(np.concatenate([inside, [0.0, 0.5]]))).max())
+    inner_roots = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0) & (roots.real < 0.5)]
+    return float(np.abs(law(np.concatenate([inner_roots, [0.0, 0.5]]))).max())
 
 
 class CycloidalMotion(AbstractProfile):
@@ -238,10 +238,10 @@ def motion_profile(
         if duration is None:
             raise TrajectoryError("either limits or a duration are needed", name="duration", value=duration)
         return law(duration)
-    bounds = [positive(bound, value) for bound, value in zip(LIMITS, limits, strict=True)]
+    bounds = [positive(limit, value) for limit, value in zip(LIMITS, limits, strict=True)]
     distance = abs(finite("end", end) - finite("start", start))
     peaks = zip(law(1.0).peaks, bounds, strict=True)
-    quickest = max((distance * peak / bound) ** (1 / order) for order, (peak, bound) in enumerate(peaks, start=1))
+    quickest = max((distance * peak / limit) ** (1 / order) for order, (peak, limit) in enumerate(peaks, start=1))
     if duration is None:
         return law(quickest or 1.0)
     if duration < quickest * (1 - 1e-12):

@@ -86,10 +86,10 @@ def joined_pieces(segments: Sequence[Segment], value: Value) -> tuple[list[Piece
     ends: list[Value] = [0.0]
     derivatives: list[Value] = [0.0, 0.0]
     for k, segment in enumerate(segments):
-        new, target, derivatives = _of_segment(segment, f"segments[{k}]", values[-1], derivatives)
-        pieces += new
+        added, target, derivatives = _of_segment(segment, f"segments[{k}]", values[-1], derivatives)
+        pieces += added
         values.append(target)
-        for piece in new:
+        for piece in added:
             ends.append(ends[-1] + piece.length)
     return pieces, ends, values
 
@@ -98,31 +98,31 @@ def _of_segment(
     segment: Segment, name: str, value: Value, derivatives: list[Value]
 ) -> tuple[list[Piece], Value, list[Value]]:
     """Return the pieces of a segment, the value at its end, and the derivatives there, the velocity first."""
-    rest: list[Value] = [0.0, 0.0]
+    at_rest: list[Value] = [0.0, 0.0]
     if segment.to is not None:
         target = number_of_value(f"{name}.to", segment.to)
     else:
         target = value if segment.by is None else value + number_of_value(f"{name}.by", segment.by)
     rise = target - value
     if segment.limits is not None:
-        return _within_limits(segment, name, value, target), target, rest
+        return _within_limits(segment, name, value, target), target, at_rest
     duration = number_of_value(f"{name}.duration", segment.duration, positive)
     if segment.profile == "dwell":
-        return [Piece([value], length=duration)], target, rest
+        return [Piece([value], length=duration)], target, at_rest
     if segment.profile == "constant_velocity":
         return [Piece([value, rise / duration], length=duration)], target, [rise / duration, 0.0]
     if segment.profile == "polynomial":
-        given = [
+        conditions = [
             default if x is None else [number_of_value(f"{name}.{key}", entry) for entry in x]
-            for key, x, default in (("begin", segment.begin, derivatives), ("end", segment.end, rest))
+            for key, x, default in (("begin", segment.begin, derivatives), ("end", segment.end, at_rest))
         ]
-        powers = _meeting([value, *given[0]], [target, *given[1]], duration)
+        powers = _meeting([value, *conditions[0]], [target, *conditions[1]], duration)
         # derivatives without a condition follow from the polynomial, and the next segment begins with them
-        free = [_derivative(powers, order, duration) for order in range(len(given[1]) + 1, len(rest) + 1)]
-        return [Piece(powers, length=duration)], target, [*given[1], *free][: len(rest)]
+        derived = [_derivative(powers, order, duration) for order in range(len(conditions[1]) + 1, len(at_rest) + 1)]
+        return [Piece(powers, length=duration)], target, [*conditions[1], *derived][: len(at_rest)]
     pieces = [piece.stretched(rise, duration).lifted(value) for piece in _shape(segment.profile)]
-    last = [0.0, -(math.pi**2) / 2 * rise / duration**2] if segment.profile == "harmonic" else rest
-    return pieces, target, last
+    end_derivatives = [0.0, -(math.pi**2) / 2 * rise / duration**2] if segment.profile == "harmonic" else at_rest
+    return pieces, target, end_derivatives
 
 
 def _within_limits(segment: Segment, name: str, value: Value, target: Value) -> list[Piece]:
@@ -132,39 +132,39 @@ def _within_limits(segment: Segment, name: str, value: Value, target: Value) -> 
         message = "phases within limits are found case by case, which JAX cannot trace; give a duration, and no limits"
         raise TrajectoryError(message, name=f"{name}.limits")
     bounds = [number_of_value(f"{name}.limits", x, positive) for x in segment.limits or ()]
-    given = (
+    options = (
         {}
         if segment.duration is None
         else {"duration": number_of_value(f"{name}.duration", segment.duration, positive)}
     )
-    if value == target and not given:
+    if value == target and not options:
         raise TrajectoryError(
             "has no displacement, so that its limits determine no duration; give one", name=f"{name}.duration"
         )
     try:
-        law = TrapezoidalMotion(value, target, **dict(zip(LIMITS, bounds, strict=True)), **given)
+        law = TrapezoidalMotion(value, target, **dict(zip(LIMITS, bounds, strict=True)), **options)
     except TrajectoryError as error:
         raise error.located(name=f"{name}.{error.name}" if error.name else name) from None
     lengths = np.diff(law.switches).tolist()
     return [Piece(c, length=t) for c, t in zip(law.coefficients[:, 1:-1].T.tolist(), lengths, strict=True)]
 
 
-def _meeting(begin: list[Value], end: list[Value], duration: Value) -> list[Value]:
+def _meeting(begins: list[Value], ends: list[Value], duration: Value) -> list[Value]:
     """Return the powers of the polynomial of least degree with given values and derivatives at both ends."""
-    lower, count = len(begin), len(begin) + len(end)
-    first = [x * duration**k / math.factorial(k) for k, x in enumerate(begin)]  # in units of the duration
-    matrix = np.array([[math.perm(k, j) for k in range(lower, count)] for j in range(len(end))], float)
-    rest = [
-        x * duration**j - sum(c * math.perm(k, j) for k, c in enumerate(first) if k >= j) for j, x in enumerate(end)
+    lower, count = len(begins), len(begins) + len(ends)
+    first = [x * duration**k / math.factorial(k) for k, x in enumerate(begins)]  # in units of the duration
+    matrix = np.array([[math.perm(k, j) for k in range(lower, count)] for j in range(len(ends))], float)
+    residuals = [
+        x * duration**j - sum(c * math.perm(k, j) for k, c in enumerate(first) if k >= j) for j, x in enumerate(ends)
     ]
     inverse = np.linalg.inv(matrix)
-    upper = [sum(float(a) * x for a, x in zip(row, rest, strict=True)) for row in inverse]
+    upper = [sum(float(a) * x for a, x in zip(row, residuals, strict=True)) for row in inverse]
     return [c / duration**k for k, c in enumerate([*first, *upper])]
 
 
-def _derivative(powers: list[Value], order: int, at: Value) -> Value:
+def _derivative(powers: list[Value], order: int, instant: Value) -> Value:
     """Return a derivative of a polynomial."""
-    return sum(c * math.perm(k, order) * at ** (k - order) for k, c in enumerate(powers) if k >= order)
+    return sum(c * math.perm(k, order) * instant ** (k - order) for k, c in enumerate(powers) if k >= order)
 
 
 # accelerations by parts: share of the duration, constant, and amplitude, frequency and phase of a sine
@@ -202,9 +202,9 @@ def _shape(profile: str) -> tuple[Piece, ...]:
             constant / 2,
         ]
         pieces.append(Piece(powers, (-reach / frequency, frequency, phase), length))
-        turned = frequency * length + phase
-        position = sum(c * length**k for k, c in enumerate(powers)) - reach / frequency * math.sin(turned)
-        velocity = powers[1] + constant * length - reach * math.cos(turned)
+        end_phase = frequency * length + phase
+        position = sum(c * length**k for k, c in enumerate(powers)) - reach / frequency * math.sin(end_phase)
+        velocity = powers[1] + constant * length - reach * math.cos(end_phase)
     return tuple(_whole(piece, position) for piece in pieces)
 
 

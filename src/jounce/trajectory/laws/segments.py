@@ -111,8 +111,8 @@ class SegmentedMotion(SplineMotion):
     def lasts(self, duration: float) -> bool:
         """Return whether the segments extend from zero to a duration, s, or an angle."""
         first = 1 if self.beyond == "continue" else 0  # the first and the last piece are at rest
-        begin = float(np.asarray(self.breakpoints)[first])
-        return abs(begin) <= CLOSED * duration and abs(float(self.stop) - duration) <= CLOSED * duration
+        start = float(np.asarray(self.breakpoints)[first])
+        return abs(start) <= CLOSED * duration and abs(float(self.stop) - duration) <= CLOSED * duration
 
     def repeated(self) -> "SegmentedMotion":
         """Return the law with repeated segments.
@@ -210,7 +210,7 @@ def _check_closed(values: list[Value]) -> None:
 
 
 def _values(segment: Segment) -> list[Value]:
-    lists = [value for part in (segment.begin, segment.end, segment.limits) for value in part or ()]
+    lists = [value for entries in (segment.begin, segment.end, segment.limits) for value in entries or ()]
     return [segment.duration, segment.to, segment.by, *lists]
 
 
@@ -225,11 +225,11 @@ def _check_segment(segment: Any, name: str) -> None:
     if not isinstance(segment, Segment):
         raise TrajectoryError("must be a jn.laws.Segment", name=name, value=segment)
     check_name("profile", segment.profile, SEGMENT_PROFILES, TrajectoryError, name=f"{name}.profile")
-    given = [key for key in ("to", "by") if getattr(segment, key) is not None]
-    if segment.profile == "dwell" and given:
-        raise TrajectoryError("a dwell goes nowhere", name=f"{name}.{given[0]}", value=getattr(segment, given[0]))
-    if segment.profile != "dwell" and len(given) != 1:
-        message = "give where the segment goes by to or by, not both" if given else "give where it goes: to, or by"
+    targets = [key for key in ("to", "by") if getattr(segment, key) is not None]
+    if segment.profile == "dwell" and targets:
+        raise TrajectoryError("a dwell goes nowhere", name=f"{name}.{targets[0]}", value=getattr(segment, targets[0]))
+    if segment.profile != "dwell" and len(targets) != 1:
+        message = "give where the segment goes by to or by, not both" if targets else "give where it goes: to, or by"
         raise TrajectoryError(message, name=name)
     for key, profile in (("begin", "polynomial"), ("end", "polynomial"), ("limits", "trapezoidal")):
         value = getattr(segment, key)

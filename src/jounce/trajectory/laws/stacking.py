@@ -28,8 +28,8 @@ def law_derivatives(
 ) -> Float[np.ndarray, "order joint time"]:
     """Return the derivatives of laws at instants."""
     stacked, members = _stacked(read_laws(laws))
-    how: Any = {"members": members, "order": order}
-    return np.asarray(_derivatives.at_instants(stacked, lambda some: times[some], len(times), **how)[0])
+    options: Any = {"members": members, "order": order}
+    return np.asarray(_derivatives.at_instants(stacked, lambda chunk: times[chunk], len(times), **options)[0])
 
 
 @Mapped
@@ -55,12 +55,11 @@ def _along_joints(*leaves: Any) -> Any:
 
 def _evaluated(laws: Sequence[AbstractMotion], members: Members, time: Jet) -> Jet:
     flat = time.map(lambda c: jnp.reshape(c, (1, -1)))
-    evaluated: list[tuple[Any, ...]] = []
+    series: list[tuple[Any, ...]] = []
     for law, indices in zip(laws, members, strict=True):
         shape = (len(indices), *flat.shape[1:])
-        evaluated.append(tuple(jnp.broadcast_to(c, shape) for c in law(flat).dense().coefficients))
+        series.append(tuple(jnp.broadcast_to(c, shape) for c in law(flat).dense().coefficients))
     order = np.argsort([index for indices in members for index in indices])
     return Jet(
-        jnp.reshape(jnp.concatenate(levels)[order], (len(order), *time.shape))
-        for levels in zip(*evaluated, strict=True)
+        jnp.reshape(jnp.concatenate(levels)[order], (len(order), *time.shape)) for levels in zip(*series, strict=True)
     )

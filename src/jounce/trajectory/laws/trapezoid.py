@@ -62,12 +62,12 @@ class TrapezoidalMotion(SplineMotion):
         if duration is not None:
             duration = positive("duration", duration, seconds)
         distance = abs(end - start)
-        given = {name: x for name, x in zip(LIMITS, (velocity, acceleration, jerk), strict=True) if x is not None}
-        if len(given) == len(LIMITS):
-            lengths = np.array(_quickest(distance, *(positive(name, value) for name, value in given.items())))
-        elif given:
+        limits = {name: x for name, x in zip(LIMITS, (velocity, acceleration, jerk), strict=True) if x is not None}
+        if len(limits) == len(LIMITS):
+            lengths = np.array(_quickest(distance, *(positive(name, value) for name, value in limits.items())))
+        elif limits:
             message = "limits on velocity, acceleration and jerk are needed, all three or none"
-            raise TrajectoryError(message, value=sorted(given))
+            raise TrajectoryError(message, value=sorted(limits))
         elif duration is None:
             raise TrajectoryError("either the three limits or a duration are needed", name="duration", value=duration)
         else:
@@ -78,10 +78,10 @@ class TrapezoidalMotion(SplineMotion):
             raise TrajectoryError(message, name="duration", value=duration)
         if duration is not None and quickest > 0:
             lengths = lengths * (duration / quickest)
-        total = quickest if duration is None else duration
+        total_length = quickest if duration is None else duration
         pieces = _phases(lengths, start, end)
-        moving = np.concatenate([[0.0], np.cumsum(lengths)[:-1], [total]])
-        begins = start_time + np.concatenate([[-1.0], moving])
+        starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1], [total_length]])
+        begins = start_time + np.concatenate([[-1.0], starts])
         self._set(begins, pieces, begins[-1], "continue")  # the first and the last piece are at rest
 
     @property
@@ -121,8 +121,8 @@ def _phases(lengths: Float[np.ndarray, "7"], start: float, end: float) -> Float[
         velocity += length * (acceleration + length * sign / 2)
         acceleration += length * sign
     scale = (end - start) / position if position > 0 else 0.0  # the jerk that makes the rise
-    moving = np.array(states).T * scale
-    moving[0] += start
-    rest = np.zeros((4, 2))
-    rest[0] = start, end
-    return np.concatenate([rest[:, :1], moving, rest[:, 1:]], axis=1)
+    phases = np.array(states).T * scale
+    phases[0] += start
+    resting = np.zeros((4, 2))
+    resting[0] = start, end
+    return np.concatenate([resting[:, :1], phases, resting[:, 1:]], axis=1)

@@ -46,7 +46,7 @@ class ReadMotion(AbstractMotion):
             self.computes.source.value.check_instants(first, last)
 
 
-def shape_of_result(what: str, advice: str, function: Callable[..., Any], *arguments: np.ndarray) -> tuple[int, ...]:
+def shape_of_result(noun: str, advice: str, function: Callable[..., Any], *arguments: np.ndarray) -> tuple[int, ...]:
     """Return the shape of the result of a function of arrays; raise MechanismError if the function cannot be used."""
     try:
         return jax.eval_shape(function, *arguments).shape
@@ -54,7 +54,7 @@ def shape_of_result(what: str, advice: str, function: Callable[..., Any], *argum
         raise
     except (TypeError, ValueError, AttributeError, IndexError) as error:
         reason = (str(error).strip() or type(error).__name__).splitlines()[0]
-        raise MechanismError(f"the {what} cannot be used: {reason}; {advice}") from error
+        raise MechanismError(f"the {noun} cannot be used: {reason}; {advice}") from error
 
 
 def tried_law(law: AbstractMotion | Callable[..., Any]) -> AbstractMotion:
@@ -72,13 +72,13 @@ def tried_law(law: AbstractMotion | Callable[..., Any]) -> AbstractMotion:
 
 
 def law_or_number(
-    what: str, name: Any, law: Any, error: type[JounceError] = TrajectoryError
+    argument: str, name: Any, law: Any, error: type[JounceError] = TrajectoryError
 ) -> AbstractMotion | SampledLaw | float:
     """Return the law of time or the number given by a motion, an expression, a function of time or a number.
 
     Parameters
     ----------
-    what : str
+    argument : str
         Name of the argument, for messages.
     name : str
         Name of the object with the law, such as a joint.
@@ -92,19 +92,19 @@ def law_or_number(
     JounceError
         Of the given class, if it is none of these, or cannot be used.
     """
-    where = f"{what}.{name}"
+    location = f"{argument}.{name}"
     if isinstance(law, AbstractMotion | SampledLaw) and not isinstance(law, FunctionMotion):
         return law
     scalar = isinstance(law, (*GIVEN, np.ndarray, jax.Array)) and not isinstance(law, bool)
     if not (callable(law) or (scalar and getattr(law, "ndim", 0) == 0)):
         message = "must be a law of time: a motion law, an expression of t, a function of time, or a number"
-        raise error(message, name=where, value=law)
+        raise error(message, name=location, value=law)
     try:
         if isinstance(law, str | Expression):
             return ExpressionMotion(law)
-        return tried_law(law) if callable(law) else finite(where, law)
+        return tried_law(law) if callable(law) else finite(location, law)
     except JounceError as fault:
-        raise error(fault.message, name=where, value=fault.value) from None
+        raise error(fault.message, name=location, value=fault.value) from None
 
 
 def given_law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
@@ -148,5 +148,5 @@ def is_users(law: Any) -> bool:
 
 
 def _read(law: AbstractMotion) -> ReadMotion:
-    plain = isinstance(law, FunctionMotion) and belongs_to_package(type(law).__call__)
-    return ReadMotion(Composed.of(law.function) if plain else ReadObject.of(law, [ORDER]))
+    is_plain = isinstance(law, FunctionMotion) and belongs_to_package(type(law).__call__)
+    return ReadMotion(Composed.of(law.function) if is_plain else ReadObject.of(law, [ORDER]))

@@ -55,19 +55,19 @@ class HermiteMotion(SplineMotion):
         instants = finite_row("times", times, seconds)
         shape = np.shape(derivatives)
         columns = shape[1] if len(shape) == 2 and shape[1] else 1
-        given = np.array(derivatives, float) if incomplete else np.zeros(shape)
-        present = ~np.isnan(given)
-        if present.ndim == 2 and ((present[:, 1:] & ~present[:, :-1]).any() or not present[:, :1].all()):
+        values = np.array(derivatives, float) if incomplete else np.zeros(shape)
+        is_given = ~np.isnan(values)
+        if is_given.ndim == 2 and ((is_given[:, 1:] & ~is_given[:, :-1]).any() or not is_given[:, :1].all()):
             message = "a derivative is known only where those below it are"
-            raise TrajectoryError(message, name="derivatives", value=given[~present.all(axis=1)][0].tolist())
-        filled = np.where(present, given, 0.0) if incomplete else derivatives
+            raise TrajectoryError(message, name="derivatives", value=values[~is_given.all(axis=1)][0].tolist())
+        filled = np.where(is_given, values, 0.0) if incomplete else derivatives
         table = finite_numbers("derivatives", filled, (len(instants), columns))
         steps = np.diff(instants)
-        twice = steps == 0
-        if (steps < 0).any() or (twice[1:] & twice[:-1]).any() or twice[:1].any() or twice[-1:].any():
+        is_double = steps == 0
+        if (steps < 0).any() or (is_double[1:] & is_double[:-1]).any() or is_double[:1].any() or is_double[-1:].any():
             raise TrajectoryError("must increase", name="times", value=instants.tolist()[:5])
-        begins = np.append(~twice, True)  # at a repeated instant, the second row begins a piece
-        pieces = hermite_pieces(instants, table) if present.all() else _mixed_pieces(instants, table, present)
+        begins = np.append(~is_double, True)  # at a repeated instant, the second row begins a piece
+        pieces = hermite_pieces(instants, table) if is_given.all() else _mixed_pieces(instants, table, is_given)
         self._set(instants[begins], pieces[:, begins], instants[-1], beyond)
 
     def jumps(self, order: int = 4) -> Jumps:
@@ -86,8 +86,8 @@ def hermite_pieces(
     steps = np.where(steps > 0, steps, 1.0)
     scaled = taylor[:, :-1] * steps ** np.arange(levels)[:, None]  # in units of the step
     ends = taylor[:matched, 1:] * steps ** np.arange(matched)[:, None]
-    missing = ends - _binomials(matched, np.arange(levels)) @ scaled
-    upper = np.linalg.solve(_binomials(matched, levels + np.arange(matched)), missing)
+    gaps = ends - _binomials(matched, np.arange(levels)) @ scaled
+    upper = np.linalg.solve(_binomials(matched, levels + np.arange(matched)), gaps)
     powers = np.concatenate([scaled, upper]) / steps ** np.arange(levels + matched)[:, None]
     powers[:levels] = taylor[:, :-1]
     return np.column_stack([powers, np.concatenate([taylor[:, -1], np.zeros(matched)])])
@@ -96,10 +96,10 @@ def hermite_pieces(
 def _mixed_pieces(
     times: Float[np.ndarray, " instants"],
     derivatives: Float[np.ndarray, "instants levels"],
-    present: Bool[np.ndarray, "instants levels"],
+    is_given: Bool[np.ndarray, "instants levels"],
 ) -> Float[np.ndarray, "powers instants"]:
     """Return the powers of pieces between instants with different numbers of derivatives."""
-    levels = np.minimum(present[:-1].sum(axis=1), present[1:].sum(axis=1))
+    levels = np.minimum(is_given[:-1].sum(axis=1), is_given[1:].sum(axis=1))
     top = int(levels.max())
     result = np.zeros((top + min(top, MET), len(times)))
     for count in np.unique(levels).tolist():
@@ -107,8 +107,8 @@ def _mixed_pieces(
         pairs = np.stack([first, first + 1], axis=1).reshape(-1)
         powers = hermite_pieces(times[pairs], derivatives[pairs, :count])[:, ::2]
         result[: len(powers), first] = powers
-    last = derivatives[-1, : present[-1].sum()][:top]
-    result[: len(last), -1] = last / np.array([math.factorial(k) for k in range(len(last))], float)
+    final = derivatives[-1, : is_given[-1].sum()][:top]
+    result[: len(final), -1] = final / np.array([math.factorial(k) for k in range(len(final))], float)
     return result
 
 

@@ -76,36 +76,36 @@ def _spline(times: np.ndarray, table: np.ndarray) -> HermiteMotion:
 
     levels, count = table.shape[1], len(times)
     steps = np.diff(times)
-    begin, end = _at_ends(levels)  # derivative levels + 1 of a piece of length 1, for each value at its ends
+    start, end = _at_ends(levels)  # derivative levels + 1 of a piece of length 1, for each value at its ends
     powers = steps[:, None] ** np.arange(levels + 1)
     given_terms = np.concatenate([table[:-1] * powers[:, :levels], table[1:] * powers[:, :levels]], axis=1)
     columns = [*range(levels), *range(levels + 1, 2 * levels + 1)]
     scale = steps ** (levels + 1)
-    left, right = (given_terms @ row[columns] / scale for row in (begin, end))  # at both ends of each piece
-    own = steps**levels / scale
+    left, right = (given_terms @ row[columns] / scale for row in (start, end))  # at both ends of each piece
+    factors = steps**levels / scale
     bands, right_side = np.zeros((3, count)), np.zeros(count)
     # inside: the derivative is continuous between pieces
-    bands[1, 1:-1] = end[2 * levels + 1] * own[:-1] - begin[levels] * own[1:]
-    bands[2, :-2] = end[levels] * own[:-1]
-    bands[0, 2:] = -begin[2 * levels + 1] * own[1:]
+    bands[1, 1:-1] = end[2 * levels + 1] * factors[:-1] - start[levels] * factors[1:]
+    bands[2, :-2] = end[levels] * factors[:-1]
+    bands[0, 2:] = -start[2 * levels + 1] * factors[1:]
     right_side[1:-1] = left[1:] - right[:-1]
     top = _end_condition(levels)  # at the ends: the highest power of the first and of the last piece vanishes
-    for row, piece, neighbor in ((0, 0, 1), (count - 1, -1, -2)):
-        mine, other = (levels, 2 * levels + 1) if row == 0 else (2 * levels + 1, levels)
-        bands[1, row] = top[mine] * own[piece]
-        bands[0 if row == 0 else 2, neighbor] = top[other] * own[piece]
-        right_side[row] = -given_terms[piece] @ top[columns] / scale[piece]
+    for row, index, neighbor in ((0, 0, 1), (count - 1, -1, -2)):
+        near_column, far_column = (levels, 2 * levels + 1) if row == 0 else (2 * levels + 1, levels)
+        bands[1, row] = top[near_column] * factors[index]
+        bands[0 if row == 0 else 2, neighbor] = top[far_column] * factors[index]
+        right_side[row] = -given_terms[index] @ top[columns] / scale[index]
     higher = solve_banded((1, 1), bands, right_side)
     return HermiteMotion(times, np.column_stack([table, higher]))
 
 
 def _basis(levels: int) -> Float[np.ndarray, "powers given"]:
     """Return the powers of a piece of length 1 for each value at its ends, with one more level than is given."""
-    given = levels + 1
+    count = levels + 1
     columns = []
-    for k in range(2 * given):
-        ends = np.zeros((2, given))
-        ends[k // given, k % given] = 1.0
+    for k in range(2 * count):
+        ends = np.zeros((2, count))
+        ends[k // count, k % count] = 1.0
         columns.append(np.asarray(HermiteMotion([0.0, 1.0], ends).coefficients)[:, 0])
     return np.stack(columns, axis=1)
 
@@ -122,10 +122,10 @@ def _end_condition(levels: int) -> Float[np.ndarray, " given"]:
 
 def _derivative(law: SplineMotion, instants: np.ndarray, order: int) -> Float[np.ndarray, " instants"]:
     begins, powers = np.asarray(law.breakpoints, float), np.asarray(law.coefficients, float)
-    piece = np.clip(np.searchsorted(begins, instants, side="right") - 1, 0, len(begins) - 1)
+    index = np.clip(np.searchsorted(begins, instants, side="right") - 1, 0, len(begins) - 1)
     factors = np.array([math.perm(k, order) for k in range(order, len(powers))], float)
-    chosen = powers[order:, piece] * factors[:, None]
-    return np.polynomial.polynomial.polyval(instants - begins[piece], chosen, tensor=False)
+    chosen = powers[order:, index] * factors[:, None]
+    return np.polynomial.polynomial.polyval(instants - begins[index], chosen, tensor=False)
 
 
 def _errors(times: np.ndarray, table: np.ndarray) -> Float[np.ndarray, " derivative"]:
@@ -147,28 +147,28 @@ def _errors(times: np.ndarray, table: np.ndarray) -> Float[np.ndarray, " derivat
     looks = (times[:-1, None] + np.diff(times)[:, None] * np.arange(LOOKS) / LOOKS).reshape(-1)
     step = float(np.median(np.diff(times)))
     grid = np.arange(WINDOW + 1.0)
-    inside = np.linspace(WINDOW / 3, WINDOW - WINDOW / 3, 8 * LOOKS + 1)
+    inner = np.linspace(WINDOW / 3, WINDOW - WINDOW / 3, 8 * LOOKS + 1)
     sigmas = [noise(times, column) for column in table.T]
-    duration, least = float(times[-1] - times[0]), float(np.ptp(table[:, 0])) / 2
+    duration, min_peak = float(times[-1] - times[0]), float(np.ptp(table[:, 0])) / 2
     errors = np.ones(degree + 1)
-    influence = [_influence(grid, inside, levels, level, degree) for level in range(levels)]
+    influence = [_influence(grid, inner, levels, level, degree) for level in range(levels)]
     for k in range(degree + 1):
         curve = _derivative(fine, looks, k)
         difference = float(np.abs(curve - _derivative(coarse, looks, k)).max()) / (2.0 ** max(degree - k, 1) - 1)
         spread = math.hypot(
             *(s * i[k] * step ** (j - k) for j, (s, i) in enumerate(zip(sigmas, influence, strict=True)))
         )
-        peak = max(float(np.abs(curve).max()), least * (2 * math.pi / duration) ** k)
+        peak = max(float(np.abs(curve).max()), min_peak * (2 * math.pi / duration) ** k)
         errors[k] = min(1.0, (INTERPOLATION_SAFETY * difference + NOISE_SAFETY * spread) / peak)
     return errors
 
 
-def _influence(grid: np.ndarray, inside: np.ndarray, levels: int, level: int, degree: int) -> list[float]:
+def _influence(grid: np.ndarray, instants: np.ndarray, levels: int, level: int, degree: int) -> list[float]:
     """Return the deviation of each derivative caused by independent noise of 1 in one level, on a grid of step 1."""
-    squares = np.zeros((degree + 1, len(inside)))
+    squares = np.zeros((degree + 1, len(instants)))
     for k in range(len(grid)):
         table = np.zeros((len(grid), levels))
         table[k, level] = 1.0
         law = _spline(grid, table)
-        squares += np.stack([_derivative(law, inside, order) ** 2 for order in range(degree + 1)])
+        squares += np.stack([_derivative(law, instants, order) ** 2 for order in range(degree + 1)])
     return np.sqrt(squares.max(axis=1)).tolist()

@@ -81,21 +81,21 @@ class MeasuredMotion(SplineMotion):
         check_choice("beyond", beyond, BEYOND, MechanismError)
         self.derivative = whole_number("derivative", derivative, 1, HIGHEST, error=MechanismError)
         repeats = beyond in ("repeat", "advance")
-        samples, ends, pieces, open_by = spline_through(times, values, degree, "repeat" if repeats else beyond)
-        if open_by:
+        samples, ends, pieces, gap = spline_through(times, values, degree, "repeat" if repeats else beyond)
+        if gap:
             message = "samples of a derivative that repeat must end at the value they begin with; the last differs by"
-            raise MechanismError(message, name="values", value=open_by)
+            raise MechanismError(message, name="values", value=gap)
         for _ in range(self.derivative):
             pieces = integrated(pieces, np.diff(ends))
         self.initial = Untraced(_checked(initial, self.derivative))
-        known = [np.nan if isinstance(x, Expression) else x for x in self.initial.value]
-        if any(isinstance(x, Tracer) for x in known):
+        initial_numbers = [np.nan if isinstance(x, Expression) else x for x in self.initial.value]
+        if any(isinstance(x, Tracer) for x in initial_numbers):
             self.initial = Untraced(())  # a tracer must not outlive its trace
-        whole, advance = _started(pieces, ends, known), 0.0
+        integrated_pieces, advance = _started(pieces, ends, initial_numbers), 0.0
         if repeats and not self._open:
-            advance = _advance(whole, ends, self.derivative, beyond)
+            advance = _advance(integrated_pieces, ends, self.derivative, beyond)
         extrapolation = "repeat" if beyond == "advance" else beyond
-        self._set(ends[:-1], whole, ends[-1], extrapolation, advance, samples=samples)
+        self._set(ends[:-1], integrated_pieces, ends[-1], extrapolation, advance, samples=samples)
         self.extrapolation = beyond
 
     def resolved(self, parameters: Mapping[str, Any]) -> "MeasuredMotion":
@@ -124,8 +124,8 @@ class MeasuredMotion(SplineMotion):
         """Estimated errors of the derivatives, relative to their peaks, (degree + 1,)."""
         if self.samples.derived is None:
             times, values = self.samples.value
-            measured = derivative_errors(times, values, self.degree - self.derivative)
-            self.samples.derived = np.concatenate([np.full(self.derivative, measured[0]), measured])
+            errors = derivative_errors(times, values, self.degree - self.derivative)
+            self.samples.derived = np.concatenate([np.full(self.derivative, errors[0]), errors])
         return self.samples.derived
 
 
@@ -133,13 +133,13 @@ def _started(
     pieces: Float[np.ndarray, "powers pieces"], ends: Float[np.ndarray, " breakpoints"], initial: Sequence[Any]
 ) -> Any:
     """Return pieces with the polynomial of the initial values added."""
-    since = ends[:-1] - ends[0]
-    added = [
-        sum(x / math.factorial(n) * math.comb(n, k) * since ** (n - k) for n, x in enumerate(initial) if n >= k)
+    elapsed = ends[:-1] - ends[0]
+    polynomial = [
+        sum(x / math.factorial(n) * math.comb(n, k) * elapsed ** (n - k) for n, x in enumerate(initial) if n >= k)
         for k in range(len(initial))
     ]
     namespace = jnp if any(isinstance(x, Tracer) for x in initial) else np
-    return namespace.concatenate([pieces[: len(added)] + namespace.stack(added), pieces[len(added) :]])
+    return namespace.concatenate([pieces[: len(polynomial)] + namespace.stack(polynomial), pieces[len(polynomial) :]])
 
 
 def _advance(pieces: Any, ends: Float[np.ndarray, " breakpoints"], derivative: int, beyond: str) -> Any:
