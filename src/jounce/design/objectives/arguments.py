@@ -37,8 +37,8 @@ class Arguments:
             return self.fixed.get(node.word)
         if node.word in MEASURES or node.word in EXERTED:
             return None
-        parts = [self.constant(part) for part in node.parts]
-        return None if None in parts else float(operated(node.word, parts))
+        operands = [self.constant(operand) for operand in node.parts]
+        return None if None in operands else float(operated(node.word, operands))
 
     def argument(self, node: Node, what: str) -> float:
         """Return the value of an argument, which must be the same in all designs."""

@@ -10,8 +10,8 @@ from jounce.units.values import parse_unit
 def check_dimensions(relation: Relation, quantities: Quantities) -> None:
     """Raise UnitError if one side has a unit that the other cannot have."""
     sides = relation.left, relation.right
-    known = [x or _dimension(side, quantities) for x, side in zip(relation.dimensions, sides, strict=True)]
-    if any(relation.dimensions) and None not in known and known[0] != known[1]:
+    dimensions = [x or _dimension(side, quantities) for x, side in zip(relation.dimensions, sides, strict=True)]
+    if any(relation.dimensions) and None not in dimensions and dimensions[0] != dimensions[1]:
         measure, unit = (side.text for side in (sides if relation.dimensions[1] else sides[::-1]))
         raise UnitError(f"{measure} cannot have the unit of what it is compared with, which is {unit} in SI units")
 
@@ -31,8 +31,8 @@ def _dimension(node: Node, quantities: Quantities) -> Dimension | None:
     if node.word not in MEASURES:
         dimensions = [_dimension(part, quantities) for part in node.parts]
         return dimensions[0] if node.word in ("+", "-", "neg", "pos") and len({*dimensions}) == 1 else None
-    rest = node.parts[1:]
-    steps = rest[0] if node.word in OVER_TIME and rest else rest[0] if len(rest) == 2 else None
+    arguments = node.parts[1:]
+    steps = arguments[0] if node.word in OVER_TIME and arguments else arguments[0] if len(arguments) == 2 else None
     if steps is not None and steps.kind != "number":
         return None
     order = 0 if steps is None else int(steps.word)

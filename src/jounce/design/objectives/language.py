@@ -50,14 +50,14 @@ class Node:
     @property
     def text(self) -> str:
         """The step as text."""
-        words = [part.text for part in self.parts]
+        operands = [part.text for part in self.parts]
         if self.kind != "call":
             return f"{self.word:g}" if self.kind == "number" else self.word
         if self.word in ("neg", "pos"):
-            return f"{'-' if self.word == 'neg' else '+'}{words[0]}"
+            return f"{'-' if self.word == 'neg' else '+'}{operands[0]}"
         if self.word in WORDS or self.word in FUNCTIONS:
-            return f"{self.word}({', '.join(words)})"
-        return f"({words[0]} {self.word} {words[1]})"
+            return f"{self.word}({', '.join(operands)})"
+        return f"({operands[0]} {self.word} {operands[1]})"
 
     @property
     def is_measured(self) -> bool:
@@ -126,17 +126,17 @@ def parsed_relations(text: str) -> list[Relation]:
     """
     if not isinstance(text, str):
         raise ExpressionError("a condition must be text, such as 'span(psi) == 60 deg'", value=text)
-    pieces = _RELATION.split(text)
-    if not 3 <= len(pieces) <= 5:
+    entries = _RELATION.split(text)
+    if not 3 <= len(entries) <= 5:
         message = "a condition is a comparison by <=, >= or ==, such as 'peak(psi, 4) <= 20'"
         raise ExpressionError(message, value=text)
-    sides = [_side(piece) for piece in pieces[::2]]
+    sides = [_side(entry) for entry in entries[::2]]
     relations = []
-    for k, sign in enumerate(pieces[1::2]):
+    for k, sign in enumerate(entries[1::2]):
         (left, first), (right, second) = sides[k : k + 2][:: -1 if ">" in sign else 1]
-        equal = sign in ("==", "=")
-        own = text.strip() if len(pieces) == 3 else f"{left.text} {'==' if equal else '<='} {right.text}"
-        relations.append(Relation(own, left, right, equal, (first, second)))
+        is_equality = sign in ("==", "=")
+        phrase = text.strip() if len(entries) == 3 else f"{left.text} {'==' if is_equality else '<='} {right.text}"
+        relations.append(Relation(phrase, left, right, is_equality, (first, second)))
     return relations
 
 
@@ -165,15 +165,15 @@ def folded(node: Node, number: Callable[[Any], Any], name: Callable[[str], Any],
     return call(node)
 
 
-def operated(word: str, values: list[Any]) -> Any:
+def operated(operation: str, values: list[Any]) -> Any:
     """Return the result of one operation on numbers, arrays of JAX or jets."""
     names = [f"x{k}" for k in range(len(values))]
-    if word in ("pos", "neg"):
-        text = f"{'-' if word == 'neg' else '+'}x0"
+    if operation in ("pos", "neg"):
+        text = f"{'-' if operation == 'neg' else '+'}x0"
     else:
-        text = f"{word}({', '.join(names)})" if word in FUNCTIONS else f"x0 {word} x1"
-    whole = word == "**" and isinstance(values[1], float)
-    if whole:  # keep a whole exponent as a literal
+        text = f"{operation}({', '.join(names)})" if operation in FUNCTIONS else f"x0 {operation} x1"
+    is_literal = operation == "**" and isinstance(values[1], float)
+    if is_literal:  # keep a whole exponent as a literal
         return Expression(f"x0 ** ({values[1]!r})").evaluate({"x0": values[0]})
     return Expression(text).evaluate(dict(zip(names, values, strict=True)))
 
@@ -181,11 +181,11 @@ def operated(word: str, values: list[Any]) -> Any:
 def refuse_name(name: str, known: Mapping[str, str], text: str) -> ExpressionError:
     """Return the error for an unknown name, with the known names by kind."""
     kinds: dict[str, list[str]] = {}
-    for each, kind in known.items():
-        kinds.setdefault(kind, []).append(each)
+    for known_name, kind in known.items():
+        kinds.setdefault(kind, []).append(known_name)
     known_names = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds.items())
-    near = did_you_mean(name, known, limit=0)
-    return ExpressionError(f"unknown name '{name}' in {show_value(text)}; {near} {known_names}".replace(";  ", "; "))
+    hint = did_you_mean(name, known, limit=0)
+    return ExpressionError(f"unknown name '{name}' in {show_value(text)}; {hint} {known_names}".replace(";  ", "; "))
 
 
 def varying_message(text: str) -> MechanismError:

@@ -74,13 +74,11 @@ class Cells:
 
     def at(self, time: float) -> tuple[int, float]:
         """Return the number of the nearest instant, and the distance of a time from it, s."""
-        nearest = int(np.argmin(np.abs(self.instants - time)))
+        index = int(np.argmin(np.abs(self.instants - time)))
         duration = float(self.instants[-1] - self.instants[0])
-        if (
-            np.diff(self.instants[nearest : nearest + 2]).min(initial=np.inf) < NEAR * duration
-        ):  # from the right, at a knot
-            nearest += 1
-        return nearest, float(time - self.instants[nearest])
+        if np.diff(self.instants[index : index + 2]).min(initial=np.inf) < NEAR * duration:  # from the right, at a knot
+            index += 1
+        return index, float(time - self.instants[index])
 
 
 def derivative(jet: Jet, order: int) -> Series:
@@ -109,12 +107,12 @@ def slope_of(series: Series) -> Float[Numbers, "lower *cell"]:
 def top(series: Float[Numbers, "order cell"], cells: Cells) -> Float[Numbers, " cell"]:
     """Return the time, relative to its instant, at which each series is largest in its cell, as a constant for JAX."""
     series = jax.lax.stop_gradient(series)
-    share = np.linspace(0.0, 1.0, SAMPLES)[:, None]
+    fractions = np.linspace(0.0, 1.0, SAMPLES)[:, None]
     width = cells.high - cells.low
-    positions = cells.low[None] + share * width[None]
-    best = jnp.argmax(value(series[:, None], jnp.asarray(positions)), axis=0)
+    positions = cells.low[None] + fractions * width[None]
+    highest = jnp.argmax(value(series[:, None], jnp.asarray(positions)), axis=0)
     spacing = width / (SAMPLES - 1)
-    start = jnp.asarray(cells.low) + best.astype(float) * spacing
+    start = jnp.asarray(cells.low) + highest.astype(float) * spacing
     low, high = jnp.maximum(start - spacing, cells.low), jnp.minimum(start + spacing, cells.high)
     rate, bend = slope_of(series), slope_of(slope_of(series))
     shift = start
@@ -127,16 +125,16 @@ def top(series: Float[Numbers, "order cell"], cells: Cells) -> Float[Numbers, " 
 
 def largest(series: Float[Numbers, "order time"], cells: Cells) -> Float[Numbers, " cell"]:
     """Return the largest value of each series in its cell."""
-    inside = series[:, cells.index]
-    return value(inside, top(inside, cells))
+    cell_series = series[:, cells.index]
+    return value(cell_series, top(cell_series, cells))
 
 
 def integral(series: Series, cells: Cells) -> Any:
     """Return the integral over all cells."""
-    inside = series[:, cells.index]
+    cell_series = series[:, cells.index]
     powers = np.arange(1.0, len(series) + 1)[:, None]
     weights = (cells.high[None] ** powers - cells.low[None] ** powers) / powers
-    return jnp.sum(inside * weights)
+    return jnp.sum(cell_series * weights)
 
 
 def square(series: Series) -> Series:
@@ -165,17 +163,17 @@ def gaps(
         index, shift = np.array([k for k, _ in positions]), np.array([h for _, h in positions])
         values = value(series[:, :, index], jnp.asarray(shift)[None])
         return values - points.T
-    fixed = jax.lax.stop_gradient(series)
+    constant_series = jax.lax.stop_gradient(series)
 
-    def nearest(point: Any) -> tuple[Any, Any]:
-        gap = jnp.concatenate([fixed[:1] - point[None, :, None], fixed[1:]])
+    def nearest_instant(point: Any) -> tuple[Any, Any]:
+        gap = jnp.concatenate([constant_series[:1] - point[None, :, None], constant_series[1:]])
         squared_distance = sum((square(gap[:, k]) for k in range(1, gap.shape[1])), square(gap[:, 0]))
         shift = top(-squared_distance[:, cells.index], cells)
-        least = value(squared_distance[:, cells.index], shift)
-        nearest_index = jnp.argmin(least)
+        distances = value(squared_distance[:, cells.index], shift)
+        nearest_index = jnp.argmin(distances)
         return jnp.asarray(cells.index)[nearest_index], shift[nearest_index]
 
-    index, shift = jax.vmap(nearest)(jnp.asarray(points))
+    index, shift = jax.vmap(nearest_instant)(jnp.asarray(points))
     values = value(series[:, :, index], shift[None])
     return values - points.T
 
@@ -217,8 +215,8 @@ def at_instants(
 
 
 def _near(
-    some: Float[np.ndarray, " some"], others: Float[np.ndarray, " others"], grid: Float[np.ndarray, " time"]
+    instants: Float[np.ndarray, " some"], targets: Float[np.ndarray, " others"], grid: Float[np.ndarray, " time"]
 ) -> Bool[np.ndarray, " some"]:
     """Return the mask of instants that coincide with an instant of a second set."""
-    distances = np.abs(some[:, None] - others).min(axis=1, initial=np.inf)
+    distances = np.abs(instants[:, None] - targets).min(axis=1, initial=np.inf)
     return distances < NEAR * (grid[-1] - grid[0] or 1.0)

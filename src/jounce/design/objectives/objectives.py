@@ -136,10 +136,10 @@ class Goals:
         self.conditions = [condition for text in subject_to for condition in self._conditions(text)]
         self.order = min(self.order + BEYOND, HIGHEST_ORDER)
         self.set_instants(instants)
-        outputs_left = {
+        used_outputs = {
             name: x for name, x in mechanism.outputs.items() if name in {a[0] for a in self.quantities.atoms.values()}
         }
-        self.mechanism = with_outputs(mechanism, {**outputs_left, **self.quantities.added})
+        self.mechanism = with_outputs(mechanism, {**used_outputs, **self.quantities.added})
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
         """Replace the grid of instants."""
@@ -150,9 +150,9 @@ class Goals:
     def series(self, outputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return the Taylor coefficients of the quantities, (order + 1, time), from outputs of a motion."""
         series = {}
-        for text, (name, component, lost) in self.quantities.atoms.items():
+        for text, (name, component, lost_orders) in self.quantities.atoms.items():
             values = outputs[name] if component is None else outputs[name][..., component]
-            series[text] = taylor_coefficients(jnp.moveaxis(jnp.asarray(values), 1, 0)[lost:])
+            series[text] = taylor_coefficients(jnp.moveaxis(jnp.asarray(values), 1, 0)[lost_orders:])
         return series
 
     def measured(self, parameters: Mapping[str, Any], outputs: Mapping[str, Any]) -> tuple[list[Any], Any]:
@@ -191,13 +191,13 @@ class Goals:
     def _series(self, node: Node, order: int) -> Callable[[Mapping[str, Any]], Any]:
         """Return the Taylor coefficients of a derivative of a quantity, (order + 1, time)."""
         quantity = self.quantities.jet(node)
-        lost = max(
+        lost_orders = max(
             (self.quantities.atoms[name][2] for name in node.names() if name in self.quantities.atoms), default=0
         )
-        if order + lost > MAX_DERIVATIVE:
-            message = f"derivatives go up to the order {MAX_DERIVATIVE}, got {order + lost} of '{node.text}'"
+        if order + lost_orders > MAX_DERIVATIVE:
+            message = f"derivatives go up to the order {MAX_DERIVATIVE}, got {order + lost_orders} of '{node.text}'"
             raise ExpressionError(message)
-        self.order = max(self.order, order + lost)
+        self.order = max(self.order, order + lost_orders)
 
         def series(names: Mapping[str, Any]) -> Any:
             jet = quantity(names)
@@ -225,8 +225,8 @@ class Goals:
             return self._measure(node, sign)
         if node.word in EXERTED:
             raise varying_message(node.text)
-        parts = [self._number(part, each) for part, each in zip(node.parts, self._signs(node, sign), strict=True)]
-        return lambda names, extremes, smooth: operated(node.word, [part(names, extremes, smooth) for part in parts])
+        operands = [self._number(part, trend) for part, trend in zip(node.parts, self._signs(node, sign), strict=True)]
+        return lambda names, extremes, smooth: operated(node.word, [part(names, extremes, smooth) for part in operands])
 
     def _signs(self, node: Node, sign: int | None) -> Sequence[int | None]:
         """Return the signs with which goals depend on the operands of an operation; None where values decide."""
@@ -246,21 +246,21 @@ class Goals:
         return [None] * len(node.parts)
 
     def _measure(self, node: Node, sign: int | None) -> Numbers:
-        kind, (quantity, *rest) = node.word, node.parts
+        kind, (quantity, *arguments) = node.word, node.parts
         if kind.startswith("path"):
             return self._path(node, sign)
         if kind == "at":
-            order = self._arguments.derivative(rest[0]) if len(rest) == 2 else 0
-            instant = self._arguments.instant(rest[-1])
+            order = self._arguments.derivative(arguments[0]) if len(arguments) == 2 else 0
+            instant = self._arguments.instant(arguments[-1])
             series = self._series(quantity, order)
 
-            def there(names: Mapping[str, Any]) -> Any:
+            def value_at(names: Mapping[str, Any]) -> Any:
                 index, shift = self._whole.at(instant)
                 return value(series(names)[:, index : index + 1], jnp.asarray([shift]))[0]
 
-            return self._smooth_number(there)
-        order = self._arguments.derivative(rest[0]) if rest else 0
-        window = self._arguments.window(rest)
+            return self._smooth_number(value_at)
+        order = self._arguments.derivative(arguments[0]) if arguments else 0
+        window = self._arguments.window(arguments)
         series = self._series(quantity, order)
         if kind in ("mean", "rms"):
             return self._smooth_number(self._mean(series, window, root=kind == "rms"))
@@ -269,17 +269,17 @@ class Goals:
     def _mean(
         self, series: Callable[..., Any], window: tuple[Any, Any], *, root: bool, squared: bool = False
     ) -> Quantity:
-        def mean_of(names: Mapping[str, Any]) -> Any:
+        def mean_value(names: Mapping[str, Any]) -> Any:
             cells, values = Cells.of(self.instants, *window), series(names)
             length = float(np.sum(cells.high - cells.low))
             mean = integral(square(values) if root else values, cells) / length
             return safe_root(mean) if root and not squared else mean
 
-        return mean_of
+        return mean_value
 
     def _smooth_number(self, measure: Quantity) -> Numbers:
         (index,) = self._smooth_block(measure, 1)
-        return lambda *known: known[2][index]
+        return lambda *arguments: arguments[2][index]
 
     def _smooth_block(self, measure: Quantity, count: int) -> range:
         """Add smooth measures that are evaluated together, and return their indices."""
@@ -294,19 +294,19 @@ class Goals:
         def lower(names: Mapping[str, Any], cells: Cells) -> Any:
             return largest(-series(names), cells)
 
-        def both(names: Mapping[str, Any], cells: Cells) -> Any:
+        def both_signs(names: Mapping[str, Any], cells: Cells) -> Any:
             values = series(names)
             return jnp.concatenate([largest(values, cells), largest(-values, cells)])
 
         if kind == "peak":
-            return self._added_extreme(both, window, sign)
+            return self._added_extreme(both_signs, window, sign)
         if kind == "maximum":
             return self._added_extreme(upper, window, sign)
-        least = self._added_extreme(lower, window, None if sign is None else sign * (-1 if kind == "minimum" else 1))
+        lowest = self._added_extreme(lower, window, None if sign is None else sign * (-1 if kind == "minimum" else 1))
         if kind == "minimum":
-            return lambda names, extremes, smooth: -least(names, extremes, smooth)
-        most = self._added_extreme(upper, window, sign)
-        return lambda names, extremes, smooth: most(names, extremes, smooth) + least(names, extremes, smooth)
+            return lambda names, extremes, smooth: -lowest(names, extremes, smooth)
+        highest = self._added_extreme(upper, window, sign)
+        return lambda names, extremes, smooth: highest(names, extremes, smooth) + lowest(names, extremes, smooth)
 
     def _added_extreme(
         self, rows: Callable[[Mapping[str, Any], Cells], Any], window: tuple[Any, Any], sign: int | None
@@ -315,7 +315,7 @@ class Goals:
         self._extremes.append(rows)
         self._windows.append(window)
         self.bounded.append(sign == 1)
-        return lambda *known: known[1][index]
+        return lambda *arguments: arguments[1][index]
 
     def _path(self, node: Node, sign: int | None) -> Numbers:
         """Return the error of a path: the root mean square or the largest distance of points from it."""
@@ -353,11 +353,11 @@ class Goals:
         names = [f"{point}_{label}" for label in labels]
         quantities = [self._series(Node("name", name), 0) for name in names]
 
-        def gaps_of(known: Mapping[str, Any]) -> Any:
-            whole = jnp.stack([quantity(known) for quantity in quantities], axis=1)
-            return gaps(whole, target.points, target.times, self._whole)
+        def gap_vectors(values: Mapping[str, Any]) -> Any:
+            path = jnp.stack([quantity(values) for quantity in quantities], axis=1)
+            return gaps(path, target.points, target.times, self._whole)
 
-        return gaps_of, len(target.points)
+        return gap_vectors, len(target.points)
 
     def _is_point(self, name: str) -> bool:
         return bool(self._original.outputs[name].component_labels(self._original))
@@ -366,14 +366,14 @@ class Goals:
         """Return the square of an objective that is a root, which is smooth at zero; None for other objectives."""
         if node.kind != "call" or node.word not in ("rms", "path_error"):
             return None
-        subject, *rest = node.parts
+        subject, *arguments = node.parts
         if node.word == "path_error":
             deviation, count = self._gaps(node)
             size = len(self._original.outputs[subject.word].component_labels(self._original))
             block = self.gaps = self._smooth_block(deviation, size * count)
-            return lambda *known: jnp.sum(known[2][block.start : block.stop] ** 2) / count
-        series = self._series(subject, self._arguments.derivative(rest[0]) if rest else 0)
-        return self._smooth_number(self._mean(series, self._arguments.window(rest), root=True, squared=True))
+            return lambda *values: jnp.sum(values[2][block.start : block.stop] ** 2) / count
+        series = self._series(subject, self._arguments.derivative(arguments[0]) if arguments else 0)
+        return self._smooth_number(self._mean(series, self._arguments.window(arguments), root=True, squared=True))
 
     # conditions
 
@@ -383,8 +383,8 @@ class Goals:
             self.quantities.text = text
             for relation in parsed_relations(text):
                 check_dimensions(relation, self.quantities)
-                up = None if relation.equal else 1
-                left = self._number(relation.left, up)
+                left_sign = None if relation.equal else 1
+                left = self._number(relation.left, left_sign)
                 right = self._number(relation.right, None if relation.equal else -1)
                 conditions.append(Condition(relation, _difference(left, right), left, right))
         return conditions

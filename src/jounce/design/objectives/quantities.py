@@ -73,7 +73,7 @@ class Quantities:
 
     def atom(self, text: str) -> Quantity:
         """Return a quantity of the mechanism by its name, which may have a suffix such as ``_d2``."""
-        name, lost = (text, 0) if text in self.known else _derivative_name(text)
+        name, lost_orders = (text, 0) if text in self.known else _derivative_name(text)
         if self.known.get(name) == "points and vectors":
             labels = self.mechanism.outputs[name].component_labels(self.mechanism)
             message = f"'{name}' has components; take {' or '.join(f'{name}_{label}' for label in labels)}"
@@ -81,7 +81,7 @@ class Quantities:
         if self.known.get(name) != "quantities":
             raise refuse_name(text, self.known, self.text)
         output, component = self.output_of(name)
-        self.atoms[text] = (output, component, lost)
+        self.atoms[text] = (output, component, lost_orders)
         return lambda names: names[text]
 
     def output_of(self, name: str) -> tuple[str, int | None]:
@@ -96,9 +96,9 @@ class Quantities:
         (subject,) = node.parts
         kind, _, component = node.word.partition("_")
         mechanism = self.mechanism
-        known = {**dict.fromkeys(mechanism.drivers, "drivers"), **dict.fromkeys(mechanism.joints, "joints")}
-        if subject.kind != "name" or subject.word not in known:
-            raise refuse_name(subject.text, known, self.text)
+        elements = {**dict.fromkeys(mechanism.drivers, "drivers"), **dict.fromkeys(mechanism.joints, "joints")}
+        if subject.kind != "name" or subject.word not in elements:
+            raise refuse_name(subject.text, elements, self.text)
         output = _exerted_by(mechanism, subject.word, kind, component)
         name = f"{kind}({subject.word})"
         with naming_errors(name):
@@ -106,12 +106,12 @@ class Quantities:
         self.added[name] = output
         labels = output.component_labels(mechanism)
         if not component and labels:
-            each = [self._component(name, k, label) for k, label in enumerate(labels)]
-            squares = [Node("call", "**", (Node("name", x), Node("number", 2.0))) for x in each]
-            total = squares[0]
+            component_names = [self._component(name, k, label) for k, label in enumerate(labels)]
+            squares = [Node("call", "**", (Node("name", x), Node("number", 2.0))) for x in component_names]
+            square_sum = squares[0]
             for x in squares[1:]:
-                total = Node("call", "+", (total, x))
-            return self.jet(Node("call", "sqrt", (total,)))
+                square_sum = Node("call", "+", (square_sum, x))
+            return self.jet(Node("call", "sqrt", (square_sum,)))
         if component and component not in labels:
             message = f"'{node.text}' does not exist; {name} has {'components ' if labels else 'no components '}"
             raise ExpressionError(f"{message}{', '.join(labels)}".rstrip())
@@ -139,8 +139,8 @@ class Quantities:
             raise ExpressionError(message)
         if node.word in EXERTED:
             return self._exerted(node)
-        parts = [self.jet(part) for part in node.parts]
-        return lambda names: operated(node.word, [part(names) for part in parts])
+        operands = [self.jet(part) for part in node.parts]
+        return lambda names: operated(node.word, [part(names) for part in operands])
 
 
 def _derivative_name(text: str) -> tuple[str, int]:
@@ -154,8 +154,8 @@ def _independent(mechanism: Mechanism, varied: set[str]) -> dict[str, float]:
     changing, count = set(varied), -1
     while len(changing) > count:
         count = len(changing)
-        for name, given in mechanism.parameters.items():
-            expression = Expression(given) if isinstance(given, str) else given
+        for name, form in mechanism.parameters.items():
+            expression = Expression(form) if isinstance(form, str) else form
             if isinstance(expression, Expression) and expression.names & changing:
                 changing.add(name)
     return {name: x for name, x in mechanism.parameter_values.items() if name not in changing}
@@ -167,8 +167,8 @@ def _exerted_by(mechanism: Mechanism, name: str, kind: str, component: str) -> A
     if driver is None or component:
         return JointForceOutput(name) if kind == "force" else JointTorqueOutput(name)
     if is_turning(driver) != (kind == "torque"):
-        right, wrong = ("torque", "force") if is_turning(driver) else ("force", "torque")
-        raise MechanismError(f"the driver '{name}' exerts a {right}, not a {wrong}; write {right}({name})")
+        effort, other_effort = ("torque", "force") if is_turning(driver) else ("force", "torque")
+        raise MechanismError(f"the driver '{name}' exerts a {effort}, not a {other_effort}; write {effort}({name})")
     return DriverTorqueOutput(name) if kind == "torque" else DriverForceOutput(name)
 
 

@@ -50,22 +50,22 @@ class Multipliers:
         by_parameter, by_extreme, by_smooth = slopes
         self.by_extreme, self.chosen = by_extreme, chosen
         self.fixed = by_parameter + by_smooth @ evaluation.smooth_slopes
-        free = np.setdiff1d(np.arange(len(extremes)), known.bounded)
-        self.fixed = self.fixed + by_extreme[:, free] @ evaluation.row_slopes[chosen[free]]
+        unbounded = np.setdiff1d(np.arange(len(extremes)), known.bounded)
+        self.fixed = self.fixed + by_extreme[:, unbounded] @ evaluation.row_slopes[chosen[unbounded]]
 
     def solved(self) -> tuple[float, Vector, Vector]:
         """Return the residual, and the multipliers of conditions and of bounds."""
         from scipy.optimize import nnls  # importing SciPy takes half a second
 
-        count, extra = len(self.evaluation.point), len(self.known.bounded)
+        count, width = len(self.evaluation.point), len(self.known.bounded)
         target = -np.concatenate([self.fixed[0], self.by_extreme[0, self.known.bounded]])
-        parts = [*self._conditions(), *self._rows(extra), *self._bounds(count + extra), *self._singular(extra)]
-        columns = np.stack([slope for slope, _, _ in parts], axis=1) if parts else np.zeros((len(target), 0))
+        rows = [*self._conditions(), *self._rows(width), *self._bounds(count + width), *self._singular(width)]
+        columns = np.stack([slope for slope, _, _ in rows], axis=1) if rows else np.zeros((len(target), 0))
         norms = np.linalg.norm(columns, axis=0)
         norms[norms == 0] = 1.0
-        weights = nnls(columns / norms, target)[0] / norms if parts else np.zeros(0)
+        weights = nnls(columns / norms, target)[0] / norms if rows else np.zeros(0)
         multipliers = {"condition": np.zeros(len(self.known.equal)), "bound": np.zeros(count), "singular": np.zeros(1)}
-        for (_, kind, signed_index), weight in zip(parts, weights, strict=True):
+        for (_, kind, signed_index), weight in zip(rows, weights, strict=True):
             if kind:
                 sign = -1.0 if signed_index < 0 else 1.0
                 multipliers[kind][abs(signed_index) - 1] += sign * weight
@@ -102,6 +102,6 @@ class Multipliers:
 
     def _singular(self, extra: int) -> list[tuple[Vector, str, int]]:
         """Return the slopes of the smallest singular values at their bound."""
-        bound = self.known.clearance**2 * (1 + 1e-4)
-        rows = self.evaluation.margin_slopes[self.evaluation.margins < bound]
+        limit = self.known.clearance**2 * (1 + 1e-4)
+        rows = self.evaluation.margin_slopes[self.evaluation.margins < limit]
         return [(np.concatenate([-slope, np.zeros(extra)]), "singular", 1) for slope in rows]

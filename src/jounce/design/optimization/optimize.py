@@ -135,9 +135,9 @@ def optimize(
                     raise
                 first_error = first_error or error
                 continue
-            whole = study.result(mechanism, best_result, assembly=number)
-            if best is None or (whole.success, -whole.objective) > (best.success, -best.objective):
-                best = whole
+            design = study.result(mechanism, best_result, assembly=number)
+            if best is None or (design.success, -design.objective) > (best.success, -best.objective):
+                best = design
     if best is None:
         assert first_error is not None
         raise first_error
@@ -188,8 +188,8 @@ def _instants(
     instants = time_grid(given, mechanism.parameter_values)
     for name, pair in bounds.items():
         for bound in pair:
-            other = time_grid(given, mechanism.with_parameters(**{name: bound}).parameter_values)
-            if other.shape != instants.shape or (other != instants).any():
+            varied = time_grid(given, mechanism.with_parameters(**{name: bound}).parameter_values)
+            if varied.shape != instants.shape or (varied != instants).any():
                 message = "the instants depend on this parameter, and must be the same in all designs; give time"
                 raise MechanismError(message, name=f"vary.{name}", value=pair)
     if len(instants) < 2:
@@ -204,8 +204,8 @@ def _curve(name: str, given: Any) -> PrescribedPath:
     times = seconds(location, given[0], MechanismError, expected) if timed else None
     points = by_component(location, given[1] if timed else given, MechanismError)
     points = real_numbers(location, points, MechanismError, expected)
-    whole = points.ndim == 2 and len(points) and np.isfinite(points).all()
-    if not whole or (times is not None and (times.shape != points.shape[:1] or not np.isfinite(times).all())):
+    is_valid = points.ndim == 2 and len(points) and np.isfinite(points).all()
+    if not is_valid or (times is not None and (times.shape != points.shape[:1] or not np.isfinite(times).all())):
         raise MechanismError(f"must be {expected}", name=location, value=given)
     return PrescribedPath(points, times)
 

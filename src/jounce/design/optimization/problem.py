@@ -90,8 +90,8 @@ class Problem:
         """Create the compiled functions of measures and goals for the grid of the goals."""
         self._cached.clear()
         # new functions, as JAX treats a method as the same function even if its object has changed
-        self._measured = jax.jit(lambda *known: self._with_slopes(*known))
-        self._numbers = jax.jit(lambda *known: self._goals_with_slopes(*known))
+        self._measured = jax.jit(lambda *arguments: self._with_slopes(*arguments))
+        self._numbers = jax.jit(lambda *arguments: self._goals_with_slopes(*arguments))
         self._each = jax.jit(jax.vmap(self._one_design))
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
@@ -107,8 +107,8 @@ class Problem:
 
     def point_of(self, values: Mapping[str, float]) -> Float[np.ndarray, " parameter"]:
         """Return the point of parameters, from 0 to 1 between their bounds."""
-        given = np.array([values[name] for name in self.names])
-        return np.clip((given - self.low) / self.width, 0.0, 1.0)
+        numbers = np.array([values[name] for name in self.names])
+        return np.clip((numbers - self.low) / self.width, 0.0, 1.0)
 
     def design(self, point: Float[np.ndarray, " parameter"]) -> Mechanism:
         """Return the mechanism at a point, with the outputs for the goals."""
@@ -133,10 +133,10 @@ class Problem:
         self.evaluations += 1
         values = jnp.asarray(list(self.values(point).values()))
 
-        def moved(values: Any) -> Any:
-            given = dict(zip(self.names, values, strict=True))
+        def motion_values(values: Any) -> Any:
+            parameters = dict(zip(self.names, values, strict=True))
             goals = self.goals
-            motion = solve(goals.mechanism.with_parameters(**given), goals.instants, goals.order, strict=False)
+            motion = solve(goals.mechanism.with_parameters(**parameters), goals.instants, goals.order, strict=False)
             pose_type, coordinates = motion.poses
             matrix = _jacobian(
                 _bare(motion.solved_model.system), cut(coordinates, 0), jnp.asarray(motion.time), pose_type=pose_type
@@ -145,12 +145,12 @@ class Problem:
             return result, (*result, motion.status)
 
         try:
-            slopes, (outputs, matrix, status) = jax.jacfwd(moved, has_aux=True)(values)
+            slopes, (outputs, matrix, status) = jax.jacfwd(motion_values, has_aux=True)(values)
         except LOCKS as error:
             raise Locked(point, error) from None
-        if (failed := np.flatnonzero(np.asarray(status))).size:
-            outcome = Status(int(status[failed[0]]))
-            message = f"at t = {self.goals.instants[failed[0]]:g} s {outcome.advice}"
+        if (failures := np.flatnonzero(np.asarray(status))).size:
+            outcome = Status(int(status[failures[0]]))
+            message = f"at t = {self.goals.instants[failures[0]]:g} s {outcome.advice}"
             raise Locked(point, SolveError(message, status=outcome))
         if not all(np.isfinite(x).all() for x in jax.tree.leaves(outputs)):
             self._check_friction(point)  # friction may lock in the whole motion
@@ -160,12 +160,12 @@ class Problem:
             raise Locked(point, SolveError(Status.UNDEFINED.advice, status=Status.UNDEFINED))
         self.owner = np.repeat(np.arange(len(rows)), [len(x) for x in rows])
         margins, margin_slopes = _margins(np.asarray(matrix), np.asarray(matrix_slopes), self._row_scale(matrix))
-        none = np.zeros(0), np.zeros((0, len(point)))
+        empty = np.zeros(0), np.zeros((0, len(point)))
         return Evaluation(
             np.array(point),
-            np.concatenate([*map(np.asarray, rows), none[0]]),
+            np.concatenate([*map(np.asarray, rows), empty[0]]),
             np.asarray(smooth),
-            np.concatenate([*(np.asarray(x).T for x in row_slopes), none[1]]),
+            np.concatenate([*(np.asarray(x).T for x in row_slopes), empty[1]]),
             np.asarray(smooth_slopes).T,
             margins,
             margin_slopes,
@@ -191,8 +191,8 @@ class Problem:
         count = len(self.goals.bounded)
         values, chosen = np.zeros(count), np.zeros(count, int)
         for k in range(count):
-            (mine,) = np.nonzero(self.owner == k)
-            chosen[k] = mine[np.argmax(evaluation.rows[mine])]
+            (rows,) = np.nonzero(self.owner == k)
+            chosen[k] = rows[np.argmax(evaluation.rows[rows])]
             values[k] = evaluation.rows[chosen[k]]
         return values, chosen
 
@@ -200,8 +200,8 @@ class Problem:
         """Return the objective and conditions, and their slopes by parameters, extremes and smooth measures."""
         values = jnp.asarray(list(self.values(point).values()))
         goals, slopes = self._numbers(values, jnp.asarray(extremes), jnp.asarray(smooth))
-        by_parameter, *others = (np.asarray(x) for x in slopes)
-        return np.asarray(goals), [by_parameter * self.width, *others]
+        by_parameter, *other_slopes = (np.asarray(x) for x in slopes)
+        return np.asarray(goals), [by_parameter * self.width, *other_slopes]
 
     def stated(self, point: Any, evaluation: Evaluation) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
         """Return the objective as stated by the user, the conditions as numbers, and both sides of each condition."""
@@ -215,19 +215,19 @@ class Problem:
         return np.asarray(self._each(jnp.asarray(rows), {name: jnp.asarray(x) for name, x in outputs.items()}))
 
     def _one_design(self, values: Any, outputs: Any) -> Any:
-        given = dict(zip(self.names, values, strict=True))
-        rows, smooth = self.goals.measured(given, outputs)
+        parameters = dict(zip(self.names, values, strict=True))
+        rows, smooth = self.goals.measured(parameters, outputs)
         extremes = jnp.stack([jnp.max(x) for x in rows]) if rows else jnp.zeros(0)
-        return self.goals.numbers(given, extremes, smooth)
+        return self.goals.numbers(parameters, extremes, smooth)
 
     def _with_slopes(self, values: Any, outputs: Any, output_slopes: Any) -> Any:
-        def measured(values: Any, outputs: Any) -> Any:
+        def measures(values: Any, outputs: Any) -> Any:
             return self.goals.measured(dict(zip(self.names, values, strict=True)), outputs)
 
-        def along(direction: Any, change: Any) -> Any:
-            return jax.jvp(measured, (values, outputs), (direction, change))[1]
+        def slope_along(direction: Any, change: Any) -> Any:
+            return jax.jvp(measures, (values, outputs), (direction, change))[1]
 
-        return measured(values, outputs), jax.vmap(along)(jnp.diag(jnp.asarray(self.width)), output_slopes)
+        return measures(values, outputs), jax.vmap(slope_along)(jnp.diag(jnp.asarray(self.width)), output_slopes)
 
     def _goals_with_slopes(self, values: Any, extremes: Any, smooth: Any) -> Any:
         def numbers(values: Any, extremes: Any, smooth: Any) -> Any:
@@ -259,6 +259,6 @@ def _margins(
 ) -> tuple[Float[np.ndarray, " time"], Float[np.ndarray, "time parameter"]]:
     """Return the squares of the smallest singular values, smooth up to locking designs, and their slopes."""
     left, values, right = np.linalg.svd(np.moveaxis(matrix * scale[:, None, None], -1, 0))
-    least = values[:, -1]
+    smallest = values[:, -1]
     u, v = left[:, :, -1] * scale, right[:, -1]
-    return least**2, 2 * least[:, None] * np.einsum("tr,prct,tc->tp", u, slopes, v)
+    return smallest**2, 2 * smallest[:, None] * np.einsum("tr,prct,tc->tp", u, slopes, v)

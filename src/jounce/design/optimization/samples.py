@@ -50,11 +50,11 @@ class Samples:
     def best(self, count: int) -> list[Float[np.ndarray, " parameter"]]:
         """Return the best points with a minimum distance from each other."""
         selected: list[np.ndarray] = []
-        least = MIN_DISTANCE * math.sqrt(self.points.shape[1])
+        min_distance = MIN_DISTANCE * math.sqrt(self.points.shape[1])
         for k in np.argsort(self.merits):
             if len(selected) >= count or not np.isfinite(self.merits[k]):
                 break
-            if all(np.linalg.norm(self.points[k] - other) > least for other in selected):
+            if all(np.linalg.norm(self.points[k] - point) > min_distance for point in selected):
                 selected.append(self.points[k])
         return selected
 
@@ -63,15 +63,15 @@ class Samples:
         stuck = self.count - int(self.moving.sum())
         if not stuck or not self.moving.any():
             return []
-        words = [f"{stuck} of {self.count} designs within the bounds cannot be assembled, or lock"]
+        phrases = [f"{stuck} of {self.count} designs within the bounds cannot be assembled, or lock"]
         step = 2.0 / self.count if self.points.shape[1] == 1 else 0.1
         for k, name in enumerate(self.names):
             low, high = bounds[name]
-            used = self.points[self.moving, k]
-            if used.min() > step or used.max() < 1 - step:
-                ends = low + (high - low) * np.array([used.min(), used.max()])
-                words.append(f"those that move have {name} from {ends[0]:.4g} to {ends[1]:.4g}")
-        return ["; ".join(words)]
+            coordinates = self.points[self.moving, k]
+            if coordinates.min() > step or coordinates.max() < 1 - step:
+                ends = low + (high - low) * np.array([coordinates.min(), coordinates.max()])
+                phrases.append(f"those that move have {name} from {ends[0]:.4g} to {ends[1]:.4g}")
+        return ["; ".join(phrases)]
 
 
 def sampled(problem: Problem, count: int | None, seed: int) -> Samples:
@@ -96,12 +96,12 @@ def sampled(problem: Problem, count: int | None, seed: int) -> Samples:
     family = solve_batch(goals.mechanism, rows, goals.instants, order, alone=False)
     outcomes = family["status"].values
     status = np.take_along_axis(outcomes, np.argmax(outcomes != Status.OK, axis=1)[:, None], axis=1)[:, 0]
-    moving = status == Status.OK
+    is_moving = status == Status.OK
     merits = np.full(len(points), np.inf)
-    if moving.any():
-        outputs = {name: _flat(family[name].values[moving]) for name in goals.mechanism.outputs}
-        numbers = problem.sampled(values[moving], outputs)
-        merits[moving] = _merits(numbers, np.array([c.relation.equal for c in goals.conditions], bool))
+    if is_moving.any():
+        outputs = {name: _flat(family[name].values[is_moving]) for name in goals.mechanism.outputs}
+        numbers = problem.sampled(values[is_moving], outputs)
+        merits[is_moving] = _merits(numbers, np.array([c.relation.equal for c in goals.conditions], bool))
         merits[~np.isfinite(merits)] = np.inf
     return Samples(problem.names, points, status, merits)
 
@@ -116,5 +116,5 @@ def _merits(numbers: Float[np.ndarray, "design goal"], equal: Bool[np.ndarray, "
     broken = np.where(equal, np.abs(conditions), np.maximum(conditions, 0.0))
     sizes = np.median(np.abs(conditions), axis=0)
     scale = float(np.median(np.abs(objective))) or 1.0
-    worst = (broken / np.where(sizes > 0, sizes, 1.0)).max(axis=1, initial=0.0)
-    return objective / scale + PENALTY * worst
+    violations = (broken / np.where(sizes > 0, sizes, 1.0)).max(axis=1, initial=0.0)
+    return objective / scale + PENALTY * violations

@@ -116,15 +116,15 @@ class Search:
                 return fitted
             best = fitted.point
         for _ in range(ROUNDS):
-            run = _Run(self, best, radius, elastic=elastic)
-            locked, inside = run.run()
-            moved = float(np.abs(run.best - best).max(initial=0.0))
-            better, best = run.merit_of(run.best) < run.merit_of(best), run.best
+            attempt = _Run(self, best, radius, elastic=elastic)
+            locked, is_inside = attempt.run()
+            shift = float(np.abs(attempt.best - best).max(initial=0.0))
+            is_better, best = attempt.merit_of(attempt.best) < attempt.merit_of(best), attempt.best
             if locked is not None:
                 radius = min(radius / 4, max(float(np.abs(locked.point - best).max()) / 2, SMALLEST_REGION))
                 if radius <= SMALLEST_REGION:
                     break
-            elif inside or (not better and moved < ACTIVE):
+            elif is_inside or (not is_better and shift < ACTIVE):
                 if elastic or radius <= SMALLEST_REGION or self.result_at(best).residual <= FITTED:
                     break
                 radius /= 4  # not optimal: shorter steps are less likely to lock
@@ -153,8 +153,8 @@ class Search:
         tolerances: Any = {"xtol": ACCURACY, "ftol": ACCURACY, "gtol": ACCURACY, "jac": slopes}
         start = np.clip(point, 1e-10, 1 - 1e-10)
         fit = least_squares(gaps, start, bounds=(0.0, 1.0), max_nfev=self.iterations, **tolerances)
-        near = np.where(fit.x < ACTIVE, 0.0, np.where(fit.x > 1 - ACTIVE, 1.0, fit.x))
-        return min((point, fit.x, near), key=self._fitness)
+        rounded = np.where(fit.x < ACTIVE, 0.0, np.where(fit.x > 1 - ACTIVE, 1.0, fit.x))
+        return min((point, fit.x, rounded), key=self._fitness)
 
     def _fitness(self, point: Vector) -> tuple[float, float]:
         """Return the key that compares points: the worst violation, then the objective."""
@@ -163,8 +163,8 @@ class Search:
         except Locked:
             return np.inf, np.inf
         numbers, _ = self.problem.numbers(point, self.problem.extremes(evaluation)[0], evaluation.smooth)
-        worst = max(self.near_singular(evaluation), float(self.broken(numbers[1:]).max(initial=0.0)))
-        return (worst if worst > CONDITION_TOLERANCE else 0.0), float(numbers[0])
+        violation = max(self.near_singular(evaluation), float(self.broken(numbers[1:]).max(initial=0.0)))
+        return (violation if violation > CONDITION_TOLERANCE else 0.0), float(numbers[0])
 
     def result_at(self, point: Vector) -> SearchResult:
         """Return the result at a point: values, violations, multipliers."""
@@ -172,9 +172,9 @@ class Search:
         extremes, chosen = self.problem.extremes(evaluation)
         numbers, slopes = self.problem.numbers(point, extremes, evaluation.smooth)
         broken = self.broken(numbers[1:], self._sizes_at(evaluation))
-        near = self.near_singular(evaluation)
+        singular_violation = self.near_singular(evaluation)
         kkt = Multipliers(self._known(float(numbers[0])), evaluation, numbers, slopes, extremes, chosen)
-        return SearchResult(point, evaluation, float(numbers[0]), broken, near, *kkt.solved())
+        return SearchResult(point, evaluation, float(numbers[0]), broken, singular_violation, *kkt.solved())
 
     def _known(self, objective: float) -> Known:
         goals, size = self.problem.goals, abs(objective)
@@ -195,8 +195,8 @@ class Search:
 
     def near_singular(self, evaluation: Evaluation) -> float:
         """Return the relative distance of the smallest singular value below its bound."""
-        least = float(np.sqrt(evaluation.margins.min(initial=np.inf)))
-        return max(0.0, 1.0 - least / self.clearance) if self.clearance else 0.0
+        smallest = float(np.sqrt(evaluation.margins.min(initial=np.inf)))
+        return max(0.0, 1.0 - smallest / self.clearance) if self.clearance else 0.0
 
     def _set_scales(self, evaluation: Evaluation) -> None:
         extremes, _ = self.problem.extremes(evaluation)
@@ -228,8 +228,8 @@ class _Run:
         evaluation = self.problem.evaluate(start)
         self.extremes = search.bounded
         numbers = self._extremes(evaluation)[self.extremes] / search.extreme_sizes[self.extremes]
-        worst = self.merit_parts(evaluation)[1] if elastic else 0.0
-        self.first = np.concatenate([start, numbers, [worst] * elastic])
+        violation = self.merit_parts(evaluation)[1] if elastic else 0.0
+        self.first = np.concatenate([start, numbers, [violation] * elastic])
         self.best, self._best_merit = start, self.merit_of(start)
         self.evaluations = 0
         self._last = self._inequalities(self.first)[0]
@@ -257,9 +257,9 @@ class _Run:
             return locked, False
         except _EvaluationLimitError:
             return None, True
-        free = (self.best > self.low + ACTIVE * self.radius) | (self.low <= 0.0)
-        free &= (self.best < self.high - ACTIVE * self.radius) | (self.high >= 1.0)
-        return None, bool(free.all())
+        is_inside = (self.best > self.low + ACTIVE * self.radius) | (self.low <= 0.0)
+        is_inside &= (self.best < self.high - ACTIVE * self.radius) | (self.high >= 1.0)
+        return None, bool(is_inside.all())
 
     # designs compared
 
@@ -267,8 +267,8 @@ class _Run:
         """Return the objective and the worst violation, both relative."""
         numbers, _ = self.problem.numbers(evaluation.point, self._extremes(evaluation), evaluation.smooth)
         broken = self.search.broken(numbers[1:])
-        worst = max(float(broken.max(initial=0.0)), self.search.near_singular(evaluation))
-        return float(numbers[0]) / self.search.scale, worst
+        violation = max(float(broken.max(initial=0.0)), self.search.near_singular(evaluation))
+        return float(numbers[0]) / self.search.scale, violation
 
     def merit_of(self, point: Vector) -> tuple[float, float]:
         """Return the key that compares designs: the worst violation, then the objective."""
@@ -284,9 +284,9 @@ class _Run:
         return False
 
     def _seen(self, point: Vector) -> Evaluation:
-        before = self.problem.evaluations
+        previous_count = self.problem.evaluations
         evaluation = self.problem.evaluate(point)
-        if self.problem.evaluations != before:
+        if self.problem.evaluations != previous_count:
             self.evaluations += 1
             if self.evaluations > EACH * self.search.iterations:
                 raise _EvaluationLimitError
@@ -306,8 +306,8 @@ class _Run:
         """Return the evaluated design, and the extremes, some replaced by the variables of SLSQP."""
         evaluation = self._seen(np.clip(variables[: self.count], self.low, self.high))
         extremes = self._extremes(evaluation)
-        own = variables[self.count : self.count + len(self.extremes)]
-        extremes[self.extremes] = own * self.search.extreme_sizes[self.extremes]
+        values = variables[self.count : self.count + len(self.extremes)]
+        extremes[self.extremes] = values * self.search.extreme_sizes[self.extremes]
         return evaluation, extremes
 
     def _goals(self, variables: Vector) -> tuple[Vector, Float[np.ndarray, "goal variable"]]:
@@ -318,10 +318,10 @@ class _Run:
         )
         slopes = by_parameter + by_smooth @ evaluation.smooth_slopes
         _, chosen = self.problem.extremes(evaluation)
-        free = np.setdiff1d(np.arange(len(extremes)), self.extremes)
-        slopes = slopes + by_extreme[:, free] @ evaluation.row_slopes[chosen[free]]
-        own = by_extreme[:, self.extremes] * self.search.extreme_sizes[self.extremes]
-        return numbers, np.concatenate([slopes, own, np.zeros((len(numbers), int(self.elastic)))], axis=1)
+        unbounded = np.setdiff1d(np.arange(len(extremes)), self.extremes)
+        slopes = slopes + by_extreme[:, unbounded] @ evaluation.row_slopes[chosen[unbounded]]
+        bounded_slopes = by_extreme[:, self.extremes] * self.search.extreme_sizes[self.extremes]
+        return numbers, np.concatenate([slopes, bounded_slopes, np.zeros((len(numbers), int(self.elastic)))], axis=1)
 
     def _objective(self, variables: Vector) -> float:
         if self._locks(variables):
@@ -338,23 +338,23 @@ class _Run:
         search, evaluation = self.search, self._split(variables)[0]
         numbers, slopes = self._goals(variables)
         scaled, scaled_slopes = numbers[1:] / search.sizes, slopes[1:] / search.sizes[:, None]
-        unequal = ~search.equal
-        parts = [(-scaled[unequal], -scaled_slopes[unequal])]
+        is_inequality = ~search.equal
+        blocks = [(-scaled[is_inequality], -scaled_slopes[is_inequality])]
         if self.elastic:  # two inequalities replace an equality
-            parts += [(-scaled[search.equal], -scaled_slopes[search.equal])]
-            parts += [(scaled[search.equal], scaled_slopes[search.equal])]
-            parts = [(v + variables[-1], np.concatenate([s[:, :-1], np.ones((len(v), 1))], axis=1)) for v, s in parts]
+            blocks += [(-scaled[search.equal], -scaled_slopes[search.equal])]
+            blocks += [(scaled[search.equal], scaled_slopes[search.equal])]
+            blocks = [(v + variables[-1], np.concatenate([s[:, :-1], np.ones((len(v), 1))], axis=1)) for v, s in blocks]
         for k, extreme in enumerate(self.extremes):
-            mine, size = self.problem.owner == extreme, search.extreme_sizes[extreme]
-            rows = np.zeros((int(mine.sum()), len(variables)))
-            rows[:, : self.count] = -evaluation.row_slopes[mine] / size
+            is_owned, size = self.problem.owner == extreme, search.extreme_sizes[extreme]
+            rows = np.zeros((int(is_owned.sum()), len(variables)))
+            rows[:, : self.count] = -evaluation.row_slopes[is_owned] / size
             rows[:, self.count + k] = 1.0
-            parts.append((variables[self.count + k] - evaluation.rows[mine] / size, rows))
+            blocks.append((variables[self.count + k] - evaluation.rows[is_owned] / size, rows))
         if search.clearance:
             padding = np.zeros((len(evaluation.margins), len(variables) - self.count))
             slack, slope = evaluation.margins - search.clearance**2, evaluation.margin_slopes
-            parts.append((slack, np.concatenate([slope, padding], axis=1)))
-        return np.concatenate([v for v, _ in parts]), np.concatenate([s for _, s in parts])
+            blocks.append((slack, np.concatenate([slope, padding], axis=1)))
+        return np.concatenate([v for v, _ in blocks]), np.concatenate([s for _, s in blocks])
 
     def _above(self, variables: Vector) -> Vector:
         if self._locks(variables):

@@ -92,11 +92,11 @@ class Study:
         except Locked as error:
             points, lock = [], error
         if starts > 1 or not points:
-            taken = sampled(self.problem, samples, self.seed)
-            self.notes += taken.notes(self.request.bounds)
-            points += taken.best(starts - len(points))
+            sample = sampled(self.problem, samples, self.seed)
+            self.notes += sample.notes(self.request.bounds)
+            points += sample.best(starts - len(points))
             if not points:
-                raise _infeasible_error(lock, taken)
+                raise _infeasible_error(lock, sample)
         if lock is not None:
             self.notes.append(f"the mechanism as it is cannot be moved: {lock}")
         self.total = len(points)
@@ -132,33 +132,33 @@ class Study:
             If there is none; the error contains the design with the smallest worst violation.
         """
         nearest = sorted(ends, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))[:3]
-        met = [self.search.from_point(end.point, elastic=True) for end in nearest]
-        ends = [self.search.from_point(end.point) for end in met if end.feasible]
-        feasible = [end for end in (*ends, *met) if end.feasible]
+        trials = [self.search.from_point(end.point, elastic=True) for end in nearest]
+        ends = [self.search.from_point(end.point) for end in trials if end.feasible]
+        feasible = [end for end in (*ends, *trials) if end.feasible]
         if feasible:
             return feasible
-        least = min(met, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))
-        design = self.result(self.mechanism, least, infeasible=True)
+        best = min(trials, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))
+        design = self.result(self.mechanism, best, infeasible=True)
         raise DesignError(
-            f"no design within the bounds was found that {self._violated_conditions(least)}", design=design
+            f"no design within the bounds was found that {self._violated_conditions(best)}", design=design
         )
 
-    def _violated_conditions(self, least: SearchResult) -> str:
+    def _violated_conditions(self, end: SearchResult) -> str:
         """Return a description of the conditions that the nearest design violates."""
-        _, numbers, sides = self.problem.stated(least.point, least.evaluation)
-        words = []
+        _, numbers, sides = self.problem.stated(end.point, end.evaluation)
+        phrases = []
         for condition, number, broken, (left, right) in zip(
-            self.goals.conditions, numbers, least.broken, sides, strict=True
+            self.goals.conditions, numbers, end.broken, sides, strict=True
         ):
             if broken > CONDITION_TOLERANCE:
-                text, near, bound = condition.relation.text, left, right
+                text, value, bound = condition.relation.text, left, right
                 if condition.relation.bound_left:
-                    near, bound = right, left
-                words.append(f"meets '{text}': nearest is {near:.6g} against {bound:.6g}, off by {abs(number):.3g}")
-        if least.near_singular > CONDITION_TOLERANCE:
-            words.append("stays clear of a singular position at all instants")
-        where = ", ".join(f"{name} = {x:.6g}" for name, x in self.problem.values(least.point).items())
-        return f"{'; and none that '.join(words)} (SI, at {where}); widen the bounds or ease the conditions"
+                    value, bound = right, left
+                phrases.append(f"meets '{text}': nearest is {value:.6g} against {bound:.6g}, off by {abs(number):.3g}")
+        if end.near_singular > CONDITION_TOLERANCE:
+            phrases.append("stays clear of a singular position at all instants")
+        parameters = ", ".join(f"{name} = {x:.6g}" for name, x in self.problem.values(end.point).items())
+        return f"{'; and none that '.join(phrases)} (SI, at {parameters}); widen the bounds or ease the conditions"
 
     def _refined(self, result: SearchResult) -> SearchResult:
         """Continue the search on finer grids until its result does not depend on the grid."""
@@ -200,10 +200,10 @@ class Study:
         try:
             goals.set_instants(instants)
             motion = solve(mechanism.with_parameters(**values), goals.instants, goals.order, strict=False)
-            if (failed := motion.status[motion.status != Status.OK]).size:
-                raise SolveError(Status(int(failed[0])).advice, status=Status(int(failed[0])))
+            if (failures := motion.status[motion.status != Status.OK]).size:
+                raise SolveError(Status(int(failures[0])).advice, status=Status(int(failures[0])))
             outputs = {name: np.asarray(x) for name, x in motion.outputs.items()}
-            rows, smooth = jax.jit(lambda *known: goals.measured(*known))(values, outputs)
+            rows, smooth = jax.jit(lambda *arguments: goals.measured(*arguments))(values, outputs)
             extremes = np.array([float(np.max(x)) for x in rows])
             numbers = np.asarray(goals.numbers(values, extremes, np.asarray(smooth), as_stated=True))
             return float(numbers[0]), numbers[1:], goals.sides(values, extremes, np.asarray(smooth))
@@ -227,16 +227,16 @@ class Study:
         mechanism = self._assembled(original.with_parameters(**parameters), end, assembly)
         status, message = self._judged(end, error, infeasible=infeasible)
         try:
-            after = self._on(fine, self.goals.mechanism, parameters)
+            final = self._on(fine, self.goals.mechanism, parameters)
         except LOCKS:
-            after = self.problem.stated(end.point, end.evaluation)
+            final = self.problem.stated(end.point, end.evaluation)
         return OptimizedDesign(
             mechanism,
             parameters,
-            after[0],
+            final[0],
             status,
             message,
-            tuple(self._comparisons(original, end, after)),
+            tuple(self._comparisons(original, end, final)),
             float(np.sqrt(end.evaluation.margins.min(initial=np.inf))),
             end.residual,
             error,
@@ -264,37 +264,37 @@ class Study:
                 f"the search ended before no better design was near (first-order residual {end.residual:.1e}); "
                 "take more iterations or starts"
             )
-        where = f"; the best of {len(self.searches)} searches" if len(self.searches) > 1 else ""
-        return "optimal", f"no design nearby is better, and all conditions hold{where}"
+        note = f"; the best of {len(self.searches)} searches" if len(self.searches) > 1 else ""
+        return "optimal", f"no design nearby is better, and all conditions hold{note}"
 
     def _comparisons(
-        self, original: Mechanism, end: SearchResult, after: tuple[float, np.ndarray, list[Any]]
+        self, original: Mechanism, end: SearchResult, final: tuple[float, np.ndarray, list[Any]]
     ) -> Iterator[Comparison]:
         """Yield objective, conditions and parameters of the given mechanism and of the design."""
-        known = original.parameter_values  # possibly outside of the bounds
-        given = {name: float(known[name]) for name in self.problem.names}
-        as_given = with_outputs(original, self.goals.mechanism.outputs)  # in its own assembly, not that of this study
+        all_values = original.parameter_values  # possibly outside of the bounds
+        initial_values = {name: float(all_values[name]) for name in self.problem.names}
+        unchanged = with_outputs(original, self.goals.mechanism.outputs)  # in its own assembly, not that of this study
         try:
-            before = self._on(_split(self.goals.instants, FINER), as_given, given)
+            initial = self._on(_split(self.goals.instants, FINER), unchanged, initial_values)
         except LOCKS:
             nothing = [(math.nan, math.nan)] * len(self.goals.conditions)
-            before = math.nan, np.full(len(self.goals.conditions), math.nan), nothing
-        root = end.objective and after[0] and self.goals.objective is not self.goals.objective_value
-        factor = 0.5 / after[0] if root else 1.0  # from slopes of a square to slopes of its root
-        yield Comparison("objective", self.request.minimize, before[0], after[0])
-        rows = zip(self.goals.conditions, before[2], after[2], end.multipliers, strict=True)
-        for condition, first, last, multiplier in rows:
+            initial = math.nan, np.full(len(self.goals.conditions), math.nan), nothing
+        root = end.objective and final[0] and self.goals.objective is not self.goals.objective_value
+        factor = 0.5 / final[0] if root else 1.0  # from slopes of a square to slopes of its root
+        yield Comparison("objective", self.request.minimize, initial[0], final[0])
+        rows = zip(self.goals.conditions, initial[2], final[2], end.multipliers, strict=True)
+        for condition, initial_sides, final_sides, multiplier in rows:
             relation = condition.relation
-            fixed_left = relation.bound_left
-            measure, bound = (1, last[0]) if fixed_left else (0, last[1])
-            low = bound if relation.equal or fixed_left else None
-            high = bound if relation.equal or not fixed_left else None
-            slope = float(multiplier * factor * (1.0 if fixed_left else -1.0))
-            yield Comparison("condition", relation.text, first[measure], last[measure], low, high, slope)
+            is_left_fixed = relation.bound_left
+            measure, bound = (1, final_sides[0]) if is_left_fixed else (0, final_sides[1])
+            low = bound if relation.equal or is_left_fixed else None
+            high = bound if relation.equal or not is_left_fixed else None
+            slope = float(multiplier * factor * (1.0 if is_left_fixed else -1.0))
+            yield Comparison("condition", relation.text, initial_sides[measure], final_sides[measure], low, high, slope)
         values = self.problem.values(end.point)
         for k, (name, (low, high)) in enumerate(self.request.bounds.items()):
             slope = float(end.bound_multipliers[k]) * factor / float(self.problem.width[k])
-            yield Comparison("parameter", name, given[name], values[name], low, high, slope)
+            yield Comparison("parameter", name, initial_values[name], values[name], low, high, slope)
 
     def _assembled(self, mechanism: Mechanism, end: SearchResult, assembly: int | None) -> Mechanism:
         """Return a mechanism that selects the optimized assembly, by its number in the optimized design."""
@@ -302,22 +302,22 @@ class Study:
             return mechanism
         first = self.goals.instants[:1]
         target = _configuration(solve(self.problem.design(end.point), first, 0))
-        for each in all_assemblies(mechanism, float(first[0]), circuits=False):
-            chosen = dataclasses.replace(mechanism, assembly=each.number)
+        for candidate in all_assemblies(mechanism, float(first[0]), circuits=False):
+            chosen = dataclasses.replace(mechanism, assembly=candidate.number)
             if np.abs(_configuration(solve(chosen, first, 0)) - target).max() <= SAME_POSITION:
                 return chosen
         message = "the assembly of the best design was not found again among the assemblies of that design"
         raise DesignError(message, name="assemblies", value=assembly)
 
 
-def _infeasible_error(lock: Locked | None, taken: Samples) -> DesignError:
+def _infeasible_error(lock: Locked | None, sample: Samples) -> DesignError:
     """Return the error for the case that no design can be assembled and moved."""
-    why = "" if lock is None else f"; the mechanism as it is: {lock}"
-    if (taken.status == Status.LOCKED).all():
-        locks = f"friction locks in all {taken.count} designs within the bounds"
-        return DesignError(f"{locks}; give bounds within which it does not{why}")
+    reason = "" if lock is None else f"; the mechanism as it is: {lock}"
+    if (sample.status == Status.LOCKED).all():
+        locks = f"friction locks in all {sample.count} designs within the bounds"
+        return DesignError(f"{locks}; give bounds within which it does not{reason}")
     bounds = "give bounds within which it can be, or a starting guess nearer to them"
-    return DesignError(f"none of {taken.count} designs within the bounds can be assembled and moved; {bounds}{why}")
+    return DesignError(f"none of {sample.count} designs within the bounds can be assembled and moved; {bounds}{reason}")
 
 
 def _configuration(motion: Motion) -> Float[np.ndarray, " entry"]:
@@ -334,15 +334,15 @@ def _configuration(motion: Motion) -> Float[np.ndarray, " entry"]:
     return np.concatenate([position.ravel() / (np.ptp(position) or 1.0), attitude.ravel()])
 
 
-def _thinned(instants: Float[np.ndarray, " given"], most: int) -> Float[np.ndarray, " time"]:
+def _thinned(instants: Float[np.ndarray, " given"], max_count: int) -> Float[np.ndarray, " time"]:
     """Return at most a number of the instants, evenly chosen, with both ends."""
-    if len(instants) <= most:
+    if len(instants) <= max_count:
         return instants
-    return instants[np.unique(np.linspace(0, len(instants) - 1, most).round().astype(int))]
+    return instants[np.unique(np.linspace(0, len(instants) - 1, max_count).round().astype(int))]
 
 
-def _split(instants: Float[np.ndarray, " given"], parts: int) -> Float[np.ndarray, " time"]:
+def _split(instants: Float[np.ndarray, " given"], count: int) -> Float[np.ndarray, " time"]:
     """Return the instants with each interval divided into equal parts."""
-    share = np.arange(parts) / parts
-    between = instants[:-1, None] + np.diff(instants)[:, None] * share
-    return np.concatenate([between.ravel(), instants[-1:]])
+    fractions = np.arange(count) / count
+    inner = instants[:-1, None] + np.diff(instants)[:, None] * fractions
+    return np.concatenate([inner.ravel(), instants[-1:]])

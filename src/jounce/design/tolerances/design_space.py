@@ -105,8 +105,8 @@ def sobol_shares(dimension: int, start: int, stop: int) -> Float[np.ndarray, "po
     if start:
         sequence.fast_forward(start)
         return sequence.random(stop - start) + 2.0 ** -(BITS + 1)
-    whole = sequence.random(power_of_two(stop))  # SciPy warns if the first points are not a power of two
-    return whole[:stop] + 2.0 ** -(BITS + 1)
+    points = sequence.random(power_of_two(stop))  # SciPy warns if the first points are not a power of two
+    return points[:stop] + 2.0 ** -(BITS + 1)
 
 
 def sample_space(variations: Mapping[str, Variation], sample: Any, nominal: Mapping[str, float]) -> Grid | Sobol:

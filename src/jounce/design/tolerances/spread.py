@@ -152,13 +152,13 @@ def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
     ('C', 'x', 3)
     """
     stem, _, digits = name.rpartition("_d")
-    plain, order = (stem, int(digits)) if stem and digits.isdecimal() and len(digits) < 3 else (name, 0)
+    stem_name, order = (stem, int(digits)) if stem and digits.isdecimal() and len(digits) < 3 else (name, 0)
     for output, quantity in mechanism.outputs.items():
-        if plain == output:
+        if stem_name == output:
             return output, "", order
-        if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in quantity.component_labels(mechanism):
-            return output, plain[len(output) + 1 :], order
-    message = f"{no_such('output', plain, mechanism.outputs)}; components and derivatives as in C_x_d3"
+        if stem_name.startswith(f"{output}_") and stem_name[len(output) + 1 :] in quantity.component_labels(mechanism):
+            return output, stem_name[len(output) + 1 :], order
+    message = f"{no_such('output', stem_name, mechanism.outputs)}; components and derivatives as in C_x_d3"
     raise MechanismError(message, name="of", value=name)
 
 
@@ -182,16 +182,16 @@ class _Spread:
         self.names, self.variations = tuple(variations), spreads(variations)
         self.space = dict(self.mechanism.parameter_values)
         self.deviations = np.array([variation.deviation() for variation in self.variations.values()])
-        whole = nominal.dataset
-        whole = whole.drop_vars([name for name in self.mechanism.outputs if name not in selected])
-        self._variables: dict[str, Any] = {str(name): whole[name].variable for name in whole.data_vars}
+        dataset = nominal.dataset
+        dataset = dataset.drop_vars([name for name in self.mechanism.outputs if name not in selected])
+        self._variables: dict[str, Any] = {str(name): dataset[name].variable for name in dataset.data_vars}
         self._outputs = selected
         self._solved: np.ndarray | None = None
-        sides, own = Sides(np.zeros((1, 0)), {}), {name: [self.space[name]] for name in self.names}
+        sides, parameters = Sides(np.zeros((1, 0)), {}), {name: [self.space[name]] for name in self.names}
         if laws_may_break(self.mechanism):
-            sides = solve_with_sides(self.mechanism, own, nominal.time, nominal.order)[1]
+            sides = solve_with_sides(self.mechanism, parameters, nominal.time, nominal.order)[1]
         for name in self._outputs:
-            dims, values = whole[name].dims[1:], whole[name].values
+            dims, values = dataset[name].dims[1:], dataset[name].values
             peak = self._peaks(name, values[None], sides)[0]
             self._put(f"{name}_peak", dims, peak, name, "largest magnitude of {} at the instants and breaks of laws")
 
@@ -201,19 +201,19 @@ class _Spread:
 
         def outputs(values: Any) -> dict[str, Any]:
             changed = self.mechanism.with_parameters(**dict(zip(self.names, values, strict=True)))
-            solved = solve(changed, self.nominal.time, self.nominal.order).outputs
-            return {name: solved[name] for name in self._outputs}
+            values_ = solve(changed, self.nominal.time, self.nominal.order).outputs
+            return {name: values_[name] for name in self._outputs}
 
         for name, gradient in jax.jacfwd(outputs)(start).items():
             dims = self._variables[name].dims
             slope = np.moveaxis(np.asarray(gradient), -1, 0)
             slope = slope.reshape(len(self.names), *self._variables[name].shape)
-            parts = (slope * self.deviations.reshape(-1, *[1] * (slope.ndim - 1))) ** 2
-            variance = parts.sum(axis=0)
-            share = np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
+            contributions = (slope * self.deviations.reshape(-1, *[1] * (slope.ndim - 1))) ** 2
+            variance = contributions.sum(axis=0)
+            fractions = np.divide(contributions, variance, out=np.zeros_like(contributions), where=variance > 0)
             self._put(f"{name}_gradient", ("parameter", *dims), slope, name, "derivative of {} by the parameter")
             self._put(f"{name}_linear_std", dims, np.sqrt(variance), name, "standard deviation of {}, first order")
-            self._put(f"{name}_share", ("parameter", *dims), share, "", "part of the variance of {}", name)
+            self._put(f"{name}_share", ("parameter", *dims), fractions, "", "part of the variance of {}", name)
 
     def add_samples(self, count: int, progress: Progress | None) -> None:
         """Add the statistics of designs drawn from the distributions."""
@@ -226,21 +226,21 @@ class _Spread:
             )
             raise MechanismError(message, name="samples", value=count)
         space = Sobol(self.variations, self.space, count)
-        whole: Histories = {n: np.full((count, *s), np.nan) for n, s in zip(self._outputs, shapes, strict=True)}
+        histories: Histories = {n: np.full((count, *s), np.nan) for n, s in zip(self._outputs, shapes, strict=True)}
         peaks = {name: np.full((count, *s[1:]), np.nan) for name, s in zip(self._outputs, shapes, strict=True)}
-        solved = np.zeros((count, len(self.nominal.time)), bool)
+        is_solved = np.zeros((count, len(self.nominal.time)), bool)
         for start, stop in _batches(count, progress):
             batch, sides = self._solved_designs(space.values(start, stop))
-            solved[start:stop] = batch["status"].values == Status.OK
+            is_solved[start:stop] = batch["status"].values == Status.OK
             for name in self._outputs:
                 if name in batch:
-                    whole[name][start:stop] = self._near_nominal(name, batch[name].values)
-                    peaks[name][start:stop] = self._peaks(name, whole[name][start:stop], sides)
-        self._solved = solved.sum(axis=0)
-        for name, values in whole.items():
+                    histories[name][start:stop] = self._near_nominal(name, batch[name].values)
+                    peaks[name][start:stop] = self._peaks(name, histories[name][start:stop], sides)
+        self._solved = is_solved.sum(axis=0)
+        for name, values in histories.items():
             dims = self._variables[name].dims
             self._add_statistics(name, "", dims, values)
-            self._add_statistics(f"{name}_peak", name, dims[1:], peaks[name][solved.all(axis=1)])
+            self._add_statistics(f"{name}_peak", name, dims[1:], peaks[name][is_solved.all(axis=1)])
 
     def add_indices(self, count: int, progress: Progress | None) -> None:
         """Add Sobol indices: the share of each parameter in the variance of the peaks, alone and with others."""
@@ -257,45 +257,45 @@ class _Spread:
         }
         peaks: dict[str, list[np.ndarray]] = {name: [] for name in self._outputs}
         for start, stop in _batches(len(shares), progress):
-            solved, sides = self._solved_designs({name: x[start:stop] for name, x in values.items()})
-            bad = (solved["status"].values != Status.OK).any(axis=1)
-            if bad.any():
-                share = f"{int(bad.sum())} of {stop - start} designs lock or cannot be assembled"
-                message = f"{share}, and indices need all of them; narrow the spread"
+            batch, sides = self._solved_designs({name: x[start:stop] for name, x in values.items()})
+            is_unsolved = (batch["status"].values != Status.OK).any(axis=1)
+            if is_unsolved.any():
+                phrase = f"{int(is_unsolved.sum())} of {stop - start} designs lock or cannot be assembled"
+                message = f"{phrase}, and indices need all of them; narrow the spread"
                 raise MechanismError(message, name="indices")
             for name in self._outputs:
-                peaks[name].append(self._peaks(name, self._near_nominal(name, solved[name].values), sides))
-        for name, parts in peaks.items():
-            whole = np.concatenate(parts)
-            flat = whole.reshape(len(whole), -1)
-            first, total = np.full((2, len(self.names), flat.shape[1]), np.nan)
+                peaks[name].append(self._peaks(name, self._near_nominal(name, batch[name].values), sides))
+        for name, chunks in peaks.items():
+            samples = np.concatenate(chunks)
+            flat = samples.reshape(len(samples), -1)
+            first_order, total_order = np.full((2, len(self.names), flat.shape[1]), np.nan)
             for k in np.flatnonzero(flat.std(axis=0) > 1e-12 * np.abs(flat).max(axis=0)):
                 settings = {"calc_second_order": False, "print_to_console": False, "seed": 1}
                 indices = analyze.analyze(problem, flat[:, k], **settings)
-                first[:, k], total[:, k] = indices["S1"], indices["ST"]
-            dims, shape = self._variables[f"{name}_peak"].dims, (len(self.names), *whole.shape[1:])
-            for kind, x, words in (("first", first, "alone"), ("total", total, "alone and with others")):
-                indices = f"part of the variance of the peak of {{}} by the parameter {words}"
+                first_order[:, k], total_order[:, k] = indices["S1"], indices["ST"]
+            dims, shape = self._variables[f"{name}_peak"].dims, (len(self.names), *samples.shape[1:])
+            for kind, x, meaning in (("first", first_order, "alone"), ("total", total_order, "alone and with others")):
+                indices = f"part of the variance of the peak of {{}} by the parameter {meaning}"
                 self._put(f"{name}_peak_{kind}_order", ("parameter", *dims), x.reshape(shape), "", indices, name)
 
     def dataset(self) -> Any:
         """Return all results, labeled."""
         import xarray
 
-        whole = self.nominal.dataset
-        coordinates = {str(name): x for name, x in whole.coords.items()} | {"parameter": list(self.names)}
+        nominal = self.nominal.dataset
+        coordinates = {str(name): x for name, x in nominal.coords.items()} | {"parameter": list(self.names)}
         coordinates["deviation"] = ("parameter", self.deviations, {"long_name": "standard deviation of the parameter"})
         variables = dict(self._variables)
         if self._solved is not None:
             variables["solved"] = ("time", self._solved, {"long_name": "samples solved"})
-        return xarray.Dataset(variables, coordinates, {"title": whole.attrs.get("title", ""), "source": "jounce"})
+        return xarray.Dataset(variables, coordinates, {"title": nominal.attrs.get("title", ""), "source": "jounce"})
 
     def _solved_designs(self, values: Mapping[str, np.ndarray]) -> tuple[Any, Sides]:
         """Return designs solved side by side, padded to a constant number so that programs compile once."""
         count = len(next(iter(values.values())))
         designs = {name: padded(x, TOGETHER) for name, x in values.items()}
-        solved, sides = solve_with_sides(self.mechanism, designs, self.nominal.time, self.nominal.order)
-        return solved.isel(design=slice(count)), sides
+        batch, sides = solve_with_sides(self.mechanism, designs, self.nominal.time, self.nominal.order)
+        return batch.isel(design=slice(count)), sides
 
     def _peaks(
         self, name: str, values: Float[np.ndarray, "sample time derivative *axes"], sides: Sides
@@ -319,8 +319,8 @@ class _Spread:
         """
         wraps = np.array(getattr(self.mechanism.outputs[name], "wraps", ()))
         if wraps.any():
-            away = values[:, 0, 0] - self._variables[name].values[0, 0]
-            values[:, :, 0] -= (whole_periods(away) * wraps)[:, None]
+            deviation = values[:, 0, 0] - self._variables[name].values[0, 0]
+            values[:, :, 0] -= (whole_periods(deviation) * wraps)[:, None]
         return values
 
     def _add_statistics(self, name: str, of: str, dims: tuple[str, ...], values: np.ndarray) -> None:
@@ -336,21 +336,21 @@ class _Spread:
                 else np.full((2, *values.shape[1:]), np.nan)
             )
         statistics |= dict(zip(BAND, bounds, strict=True))
-        words = {"mean": "mean", "std": "standard deviation", "low": "percentile 2.5", "high": "percentile 97.5"}
+        descriptions = {"mean": "mean", "std": "standard deviation", "low": "percentile 2.5", "high": "percentile 97.5"}
         for kind, x in statistics.items():
-            long_name = f"{words[kind]} of {'the peak of ' if of else ''}{{}} over the samples"
+            long_name = f"{descriptions[kind]} of {'the peak of ' if of else ''}{{}} over the samples"
             self._put(f"{name}_{kind}", dims, x, of or name, long_name)
 
     def _put(
-        self, name: str, dims: tuple[Any, ...], values: np.ndarray, units_of: str, words: str, of: str = ""
+        self, name: str, dims: tuple[Any, ...], values: np.ndarray, unit_of: str, template: str, of: str = ""
     ) -> None:
         if name in self._variables:
             message = f"two arrays of the result would be called {name}; give the output another name"
             raise MechanismError(message, name=f"outputs.{name}")
-        units = self.mechanism.outputs[units_of].unit if units_of else "1"
+        units = self.mechanism.outputs[unit_of].unit if unit_of else "1"
         from xarray import Variable
 
-        self._variables[name] = Variable(dims, values, {"units": units, "long_name": words.format(of or units_of)})
+        self._variables[name] = Variable(dims, values, {"units": units, "long_name": template.format(of or unit_of)})
 
 
 def _batches(count: int, progress: Progress | None) -> Iterator[tuple[int, int]]:

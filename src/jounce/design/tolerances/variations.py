@@ -153,11 +153,11 @@ def reader_of(mechanism: Mechanism) -> Reader:
     0.14
     """
 
-    def read(name: str, text: str) -> float:
+    def reader(name: str, text: str) -> float:
         check_name("parameter", name, mechanism.parameters, MechanismError, name="vary")
         return float(mechanism.with_parameters(**{name: text}).parameter_values[name])
 
-    return read
+    return reader
 
 
 def _variation(name: str, form: Any, read: Reader) -> Variation:
@@ -173,19 +173,19 @@ def _variation(name: str, form: Any, read: Reader) -> Variation:
 
 
 def _from_text(name: str, text: str, read: Reader) -> Variation:
-    first, *others = (part.strip() for part in text.split(":"))
+    first, *entries = (part.strip() for part in text.split(":"))
     spreads = {"normal": Normal, "uniform": Uniform}
     if first in spreads:
-        if len(others) != 1 or not others[0]:
+        if len(entries) != 1 or not entries[0]:
             raise MechanismError(f"must be {first}:SIZE, such as {first}:0.1mm", value=text)
-        size = _value(name, others[0], read)
+        size = _value(name, entries[0], read)
         if size <= 0:
-            raise MechanismError("the spread must be above zero", value=others[0])
+            raise MechanismError("the spread must be above zero", value=entries[0])
         return spreads[first](size)
-    if len(others) not in (1, 2) or not all((first, *others)):
-        hint = f"; {did_you_mean(first, spreads)}" if first.isalpha() and others else ""
+    if len(entries) not in (1, 2) or not all((first, *entries)):
+        hint = f"; {did_you_mean(first, spreads)}" if first.isalpha() and entries else ""
         raise MechanismError(f"must be {FORMS}{hint}", value=text)
-    return _interval(_value(name, first, read), _value(name, others[0], read), *others[1:])
+    return _interval(_value(name, first, read), _value(name, entries[0], read), *entries[1:])
 
 
 def _value(name: str, text: str, read: Reader) -> float:
