@@ -63,8 +63,8 @@ class Plan:
     @cached_property
     def variables(self) -> list[Variable]:
         """Arrays over the designs, parameters first."""
-        of = (self.quantities, list(self.space.variations), self.problem.levels, len(self.problem.instants))
-        return variables_of(*of, histories=self.histories)
+        arguments = (self.quantities, list(self.space.variations), self.problem.levels, len(self.problem.instants))
+        return variables_of(*arguments, histories=self.histories)
 
     @cached_property
     def names(self) -> list[str]:
@@ -102,10 +102,10 @@ class Plan:
     def _check_there(self) -> None:
         """Raise OutputError unless the folder, seen from this process, is that of this sweep."""
         try:
-            same = Store(self.folder).manifest["identity"] == self.identity
+            is_same = Store(self.folder).manifest["identity"] == self.identity
         except OutputError:
-            same = False
-        if not same:
+            is_same = False
+        if not is_same:
             message = "a worker does not see this sweep there; workers on other machines need a folder that all share"
             raise OutputError(message, path=str(self.folder))
 

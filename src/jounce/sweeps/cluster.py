@@ -35,9 +35,9 @@ def check_installed(*packages: str) -> None:
     """Raise UnsupportedError unless packages are installed."""
     from importlib.util import find_spec
 
-    missing = [package for package in packages if find_spec(package) is None]
-    if missing:
-        raise UnsupportedError(f"a sweep {MISSING.format(' and '.join(missing))}")
+    missing_packages = [package for package in packages if find_spec(package) is None]
+    if missing_packages:
+        raise UnsupportedError(f"a sweep {MISSING.format(' and '.join(missing_packages))}")
 
 
 def compute_on_cluster(
@@ -100,10 +100,10 @@ def _check_releases(client: Any, timeout: float) -> None:
         releases = client.sync(client._get_versions, packages=names, callback_timeout=max(timeout, PATIENCE))
     except (OSError, TimeoutError) as error:
         raise _lost(error) from None
-    own = {name: releases["client"]["packages"].get(name) for name in names}  # in the same format
+    client_releases = {name: releases["client"]["packages"].get(name) for name in names}  # in the same format
     for address, worker in sorted(releases["workers"].items()):
         packages = worker["packages"] if isinstance(worker, dict) else {}
-        for name, release in own.items():
+        for name, release in client_releases.items():
             if packages.get(name) != release:
                 installed = f"has {name} {packages[name]}" if packages.get(name) else f"has no {name}"
                 message = f"the worker {address} {installed}, the client has {release}; all must have the same release"
@@ -118,29 +118,29 @@ def _compute(
 
     wait: Any = distributed.wait
     plan = client.submit(bytes, content, pure=False)  # a task, which the cluster repeats for new workers
-    ahead = max(2, AHEAD * sum(client.nthreads().values()))
+    max_pending = max(2, AHEAD * sum(client.nthreads().values()))
 
     def submitted(count: int) -> set[Any]:
         return {client.submit(compute_on_worker, plan, chunk, threads, pure=False) for chunk in islice(chunks, count)}
 
-    waiting, idle = submitted(ahead), 0.0
+    waiting, idle = submitted(max_pending), 0.0
     while waiting:
         try:
-            ended = wait(waiting, timeout=POLL, return_when="FIRST_COMPLETED").done
+            finished = wait(waiting, timeout=POLL, return_when="FIRST_COMPLETED").done
             idle = 0.0
         except TimeoutError:
-            ended = set()
+            finished = set()
             idle = 0.0 if client.status == "running" and client.nthreads() else idle + POLL
         except Exception as error:  # noqa: BLE001 - CancelledError and other exceptions of a lost connection
             raise _lost(error) from None
-        for future in ended:
+        for future in finished:
             if future.status != "finished":
                 raise _reason(future)
             done(future.result())
-        waiting -= ended
+        waiting -= finished
         if client.status != "running" or idle > PATIENCE:
             raise _lost(f"status {client.status}, no worker for {idle:g} s")
-        waiting |= submitted(ahead - len(waiting))
+        waiting |= submitted(max_pending - len(waiting))
 
 
 def _reason(future: Any) -> Exception:
@@ -188,12 +188,12 @@ def _client(scheduler: str | None, workers: int | None, timeout: float, scratch:
 @contextmanager
 def _environment() -> Iterator[None]:
     """Set environment variables for workers, and restore them afterwards, which Dask does not."""
-    before = {name: os.environ.get(name) for name in FOR_WORKERS}
+    previous = {name: os.environ.get(name) for name in FOR_WORKERS}
     os.environ.update({name: os.environ.get(name) or value for name, value in FOR_WORKERS.items()})
     try:
         yield
     finally:
-        for name, value in before.items():
+        for name, value in previous.items():
             if value is None:
                 os.environ.pop(name, None)
             else:
@@ -232,23 +232,23 @@ def _track_quietly() -> None:
     """
     from multiprocessing import resource_tracker
 
-    before = sys.warnoptions
-    sys.warnoptions = [*before, "ignore:resource_tracker:UserWarning"]
+    previous = sys.warnoptions
+    sys.warnoptions = [*previous, "ignore:resource_tracker:UserWarning"]
     try:
         resource_tracker.ensure_running()
     finally:
-        sys.warnoptions = before
+        sys.warnoptions = previous
 
 
 @contextmanager
 def _dask_silenced() -> Iterator[None]:
     """Silence the messages of Dask on lost connections, which this package reports itself."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
-    before = {name: logging.getLogger(name).level for name in names}
+    levels = {name: logging.getLogger(name).level for name in names}
     for name in names:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        for name, level in before.items():
+        for name, level in levels.items():
             logging.getLogger(name).setLevel(level)

@@ -23,21 +23,21 @@ def fingerprint(value: Any) -> str:
     return digest.hexdigest()
 
 
-def _add(value: Any, put: Callable[[bytes], object], above: tuple[int, ...]) -> None:
-    """Add the bytes of an object to a digest; `above` are the objects that contain it, to end cycles."""
-    put(f"<{type(value).__module__}.{type(value).__qualname__}>".encode())
+def _add(value: Any, update: Callable[[bytes], object], containers: tuple[int, ...]) -> None:
+    """Add the bytes of an object to a digest; `containers` are the objects that contain it, to end cycles."""
+    update(f"<{type(value).__module__}.{type(value).__qualname__}>".encode())
     if value is None or isinstance(value, bool | int | str | bytes | enum.Enum):
-        put(repr(value).encode())
+        update(repr(value).encode())
     elif isinstance(value, float | complex):
-        put(np.asarray(value).tobytes())
+        update(np.asarray(value).tobytes())
     elif isinstance(value, type | types.BuiltinFunctionType | np.ufunc):
-        put(f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', repr(value))}".encode())
-    elif id(value) in above:
-        put(f"circle {above[::-1].index(id(value))}".encode())
+        update(f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', repr(value))}".encode())
+    elif id(value) in containers:
+        update(f"circle {containers[::-1].index(id(value))}".encode())
     else:
         for part in _parts(value):
-            _add(part, put, (*above, id(value)))
-    put(b";")
+            _add(part, update, (*containers, id(value)))
+    update(b";")
 
 
 def _parts(value: Any) -> list[Any]:
@@ -58,5 +58,5 @@ def _parts(value: Any) -> list[Any]:
         return [value.co_code, value.co_consts, value.co_names]
     if dataclasses.is_dataclass(value):
         return [getattr(value, field.name, None) for field in dataclasses.fields(value)]
-    made = value.__reduce_ex__(4)
-    return [made] if isinstance(made, str) else list(made[:3])
+    reduced = value.__reduce_ex__(4)
+    return [reduced] if isinstance(reduced, str) else list(reduced[:3])

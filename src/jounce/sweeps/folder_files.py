@@ -52,15 +52,15 @@ def is_sweep(folder: Path) -> bool:
 
 def is_blank(folder: Path) -> bool:
     """Return whether the folder of an array or a group contains nothing but metadata and coordinates."""
-    inside = [path.relative_to(folder) for path in folder.rglob("*") if path.is_symlink() or not path.is_dir()]
-    others = [path for path in inside if path.name != ROOT]
-    if not others:
+    paths = [path.relative_to(folder) for path in folder.rglob("*") if path.is_symlink() or not path.is_dir()]
+    other_paths = [path for path in paths if path.name != ROOT]
+    if not other_paths:
         return True
     try:
         names = parsed(read_file(folder / ROOT, LARGEST_ROOT, error=OutputError, is_input=False), folder)
     except JounceError:
         return False
-    return names.get("dimension_names") == [folder.name] and others == [Path("c", "0")]
+    return names.get("dimension_names") == [folder.name] and other_paths == [Path("c", "0")]
 
 
 @contextmanager
@@ -72,9 +72,9 @@ def naming_path(path: Path) -> Iterator[None]:
         message = f"something else takes the place of a file of the sweep; {REMOVE}"
         raise OutputError(message, path=os.fsdecode(error.filename2 or error.filename or path)) from error
     except OSError as error:
-        named = error.filename2 or error.filename or path
+        failed_path = error.filename2 or error.filename or path
         message = f"cannot be written: {reason_of(error)}"
-        raise OutputError(message, while_writing=True, path=os.fsdecode(named)) from error
+        raise OutputError(message, while_writing=True, path=os.fsdecode(failed_path)) from error
 
 
 def put(path: Path, content: bytes) -> None:

@@ -86,8 +86,8 @@ def files_of(
 def axes_of(quantities: Sequence[Quantity], instants: np.ndarray, levels: int) -> dict[str, np.ndarray]:
     """Return the coordinates of the dimensions of a sweep other than the design, by name."""
     labels = {axis: names for quantity in quantities for axis, names in quantity.axes}
-    named = {axis: np.array(names, np.dtypes.StringDType()) for axis, names in labels.items()}
-    return {"time": np.asarray(instants, float), "derivative": np.arange(levels)} | named
+    label_arrays = {axis: np.array(names, np.dtypes.StringDType()) for axis, names in labels.items()}
+    return {"time": np.asarray(instants, float), "derivative": np.arange(levels)} | label_arrays
 
 
 def _axis(root: Any, name: str, values: np.ndarray) -> None:
@@ -105,16 +105,16 @@ def _axis(root: Any, name: str, values: np.ndarray) -> None:
 
 def check_room(folder: Path, variables: Sequence[Variable], count: int, chunk: int) -> None:
     """Raise OutputError if the results of a sweep cannot fit on the disk, even if compressed."""
-    each = sum(math.prod(variable.shape) * np.dtype(variable.dtype).itemsize for variable in variables)
+    size = sum(math.prod(variable.shape) * np.dtype(variable.dtype).itemsize for variable in variables)
     files = -(-count // chunk) * (len(variables) + 1)
-    above = folder.absolute().parent
+    parent = folder.absolute().parent
     advice = "; sweep fewer designs, or write to a larger disk"
-    free = shutil.disk_usage(above).free
-    if count * each > SHRINKS * free:
-        message = f"{count} designs of {each} bytes each are {_size(count * each)}, and {_size(free)} are free{advice}"
+    space = shutil.disk_usage(parent).free
+    if count * size > SHRINKS * space:
+        message = f"{count} designs of {size} bytes each are {_size(count * size)}, and {_size(space)} are free{advice}"
         raise OutputError(message, path=str(folder))
-    if files > (most := _free_files(above)):
-        message = f"{count} designs take {files} files, and the disk has room for {most}{advice}, or in larger chunks"
+    if files > (limit := _free_files(parent)):
+        message = f"{count} designs take {files} files, and the disk has room for {limit}{advice}, or in larger chunks"
         raise OutputError(message, path=str(folder))
 
 

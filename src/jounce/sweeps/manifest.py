@@ -70,8 +70,8 @@ def manifest_of(
 
 def _identity(manifest: Mapping[str, Any]) -> str:
     """Return a digest of the content of a manifest at the start of a sweep."""
-    left_out = {"checksum": None, "identity": None}
-    return fingerprint({name: value for name, value in manifest.items() if name not in left_out} | left_out)
+    blanks = {"checksum": None, "identity": None}
+    return fingerprint({name: value for name, value in manifest.items() if name not in blanks} | blanks)
 
 
 def intact(manifest: Mapping[str, Any], path: str) -> dict[str, Any]:
@@ -82,8 +82,8 @@ def intact(manifest: Mapping[str, Any], path: str) -> dict[str, Any]:
     OutputError
         If another release wrote the manifest, or it was changed since.
     """
-    before = manifest.get("format")
-    if isinstance(before, int) and before != FORMAT:
+    release = manifest.get("format")
+    if isinstance(release, int) and release != FORMAT:
         raise OutputError("was begun by another release of jounce; give another name", path=path)
     groups = [manifest.get(name) for name in ("files", *COMPARED)]
     if all(isinstance(group, dict) for group in groups) and manifest.get("identity") == _identity(manifest):
@@ -126,8 +126,8 @@ def arithmetic() -> dict[str, str]:
 
 def check_same_arithmetic(stored: Mapping[str, Any], folder: str) -> None:
     """Raise OutputError, with the differences, unless this process computes like the one that began a sweep."""
-    own = versions()
-    if differences := _others(stored.get("versions", own), own) + _others(stored["arithmetic"], arithmetic()):
+    current = versions()
+    if differences := _others(stored.get("versions", current), current) + _others(stored["arithmetic"], arithmetic()):
         message = f"a worker rounds otherwise than what began the sweep: {'; '.join(differences)}"
         raise OutputError(f"{message}; install the same packages for both", path=folder)
 
@@ -155,14 +155,14 @@ def _differences(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> list
     """Return the differences of two manifests in words."""
     differences = []
     for name in stored["files"] | expected["files"]:
-        before, now = stored["files"].get(name), expected["files"].get(name)
-        if before != now:
+        old, new = stored["files"].get(name), expected["files"].get(name)
+        if old != new:
             differences.append(
-                f"the file {name} {'was not read' if before is None else 'differs' if now else 'is not read'}"
+                f"the file {name} {'was not read' if old is None else 'differs' if new else 'is not read'}"
             )
-    others = [{name: x.get(name) for name in ("sample", "time")} for x in (stored, expected)]
-    for before, now in [*((stored[group], expected[group]) for group in COMPARED), others]:
-        differences += _others(before, now)
+    other_settings = [{name: x.get(name) for name in ("sample", "time")} for x in (stored, expected)]
+    for old, new in [*((stored[group], expected[group]) for group in COMPARED), other_settings]:
+        differences += _others(old, new)
     if list(stored["vary"]) != list(expected["vary"]) and not differences:
         differences.append(f"the order of what varies is {', '.join(stored['vary'])} there")
     if stored["identity"] != expected["identity"] and not differences:
@@ -170,10 +170,10 @@ def _differences(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> list
     return differences
 
 
-def _others(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+def _others(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> list[str]:
     """Return the differences in a group of two manifests, value by value, in words."""
-    names = [name for name in {**before, **now} if before.get(name) != now.get(name)]
-    return [f"{n} is {_shown(before.get(n))} there, and {_shown(now.get(n))} here" for n in names]
+    names = [name for name in {**stored, **expected} if stored.get(name) != expected.get(name)]
+    return [f"{n} is {_shown(stored.get(n))} there, and {_shown(expected.get(n))} here" for n in names]
 
 
 def _shown(value: Any) -> str:

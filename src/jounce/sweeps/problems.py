@@ -172,9 +172,9 @@ class Motions(_OfMechanism):
     def histories(self, designs: Designs, threads: int) -> Histories:
         """Return the histories of some designs, solved side by side."""
         settings = {"tolerance": self.tolerance, "threads": threads}
-        solved, sides = solve_with_sides(self.mechanism, designs, self.instants, self.order, **settings)
-        values = {str(name): array.values for name, array in solved.data_vars.items() if name != "status"}
-        return Histories(values, solved["status"].values, sides=sides.like(values))
+        family, sides = solve_with_sides(self.mechanism, designs, self.instants, self.order, **settings)
+        values = {str(name): array.values for name, array in family.data_vars.items() if name != "status"}
+        return Histories(values, family["status"].values, sides=sides.like(values))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -203,56 +203,56 @@ class Simulations(_OfMechanism):
 
     def options(self) -> dict[str, Any]:
         """Return the order, the tolerance and the method."""
-        longest = None if np.isinf(self.longest_step) else float(self.longest_step)
+        longest_step = None if np.isinf(self.longest_step) else float(self.longest_step)
         method = "Taylor()" if self.method is None else repr(self.method)
-        chosen = {"order": self.order, "tolerance": self.tolerance, "method": method, "longest_step": longest}
+        chosen = {"order": self.order, "tolerance": self.tolerance, "method": method, "longest_step": longest_step}
         return {"kind": "simulations", **chosen}
 
     def histories(self, designs: Designs, threads: int) -> Histories:
         """Return the histories of some designs, simulated side by side with a thread for each core."""
         del threads
-        first, last = sorted((float(self.instants[0]), float(self.instants[-1])))
-        breaks, side_times = sides_of_designs(self.mechanism, designs, first, last, self.order, forces=True)
-        parts = [
+        start, stop = sorted((float(self.instants[0]), float(self.instants[-1])))
+        breaks, side_times = sides_of_designs(self.mechanism, designs, start, stop, self.order, forces=True)
+        results = [
             self._simulated({name: values[chunk] for name, values in designs.items()}, side_times[chunk])
             for chunk in _chunks(side_times, MORE_INSTANTS * len(self.instants))
         ]
-        values, others, status = zip(*parts, strict=True)
-        return Histories(_joined(values), np.concatenate(status), sides=Sides(breaks, _joined(others)))
+        values, side_values, status = zip(*results, strict=True)
+        return Histories(_joined(values), np.concatenate(status), sides=Sides(breaks, _joined(side_values)))
 
     def _simulated(
         self, designs: Designs, side_times: Float[np.ndarray, "design side"]
     ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], Int[np.ndarray, "design time"]]:
         """Return the outputs at the instants and on both sides of breaks of laws, and the status at the instants."""
         settings = {"method": self.method, "tolerance": self.tolerance, "longest_step": self.longest_step}
-        every, forward = np.union1d(self.instants, side_times), self.instants[0] <= self.instants[-1]
-        grid = every if forward else every[::-1]
+        instants, is_forward = np.union1d(self.instants, side_times), self.instants[0] <= self.instants[-1]
+        grid = instants if is_forward else instants[::-1]
         simulated = simulate_batch(self.mechanism, designs, grid, self.order, **settings)
-        indices, side_indices = (np.searchsorted(every, x) for x in (self.instants, side_times))
-        if not forward:
-            indices, side_indices = len(every) - 1 - indices, len(every) - 1 - side_indices
+        indices, side_indices = (np.searchsorted(instants, x) for x in (self.instants, side_times))
+        if not is_forward:
+            indices, side_indices = len(instants) - 1 - indices, len(instants) - 1 - side_indices
         shapes = {quantity.name: quantity.shape for quantity in self.quantities()}
-        whole = {name: x.reshape(*x.shape[:3], *shapes[name]) for name, x in simulated.outputs.items()}
-        unknown = simulated.status != Status.OK
-        for array in whole.values():
-            array[unknown] = np.nan
-        others = {name: array[np.arange(len(side_times))[:, None], side_indices] for name, array in whole.items()}
-        return {name: array[:, indices] for name, array in whole.items()}, others, simulated.status[:, indices]
+        values = {name: x.reshape(*x.shape[:3], *shapes[name]) for name, x in simulated.outputs.items()}
+        is_unknown = simulated.status != Status.OK
+        for array in values.values():
+            array[is_unknown] = np.nan
+        side_values = {name: array[np.arange(len(side_times))[:, None], side_indices] for name, array in values.items()}
+        return {name: array[:, indices] for name, array in values.items()}, side_values, simulated.status[:, indices]
 
 
-def _chunks(side_times: Float[np.ndarray, "design side"], most: int) -> Iterator[slice]:
+def _chunks(side_times: Float[np.ndarray, "design side"], max_instants: int) -> Iterator[slice]:
     """Yield batches of designs to simulate together, limited so that the union of their instants stays small."""
-    start, known = 0, set()
-    for k, own in enumerate(side_times.tolist()):
-        known.update(own)
-        if k > start and len(known) > most:
+    start, instants = 0, set()
+    for k, design_times in enumerate(side_times.tolist()):
+        instants.update(design_times)
+        if k > start and len(instants) > max_instants:
             yield slice(start, k)
-            start, known = k, set(own)
+            start, instants = k, set(design_times)
     yield slice(start, len(side_times))
 
 
-def _joined(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def _joined(mappings: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    return {name: np.concatenate([mapping[name] for mapping in mappings]) for name in mappings[0]}
 
 
 def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order: int) -> tuple[Quantity, ...]:
@@ -264,11 +264,11 @@ def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order
     zeros = np.zeros_like(pose.position.coefficients[0])
     pose = pose.extended(zeros, None if mechanism.space == "planar" else zeros)  # for outputs that are rates
     of_motion = any(isinstance(output, AbstractMotionOutput) for output in mechanism.outputs.values())
-    known = with_outputs(solve(mechanism, instants, order, strict=False))[1] if of_motion else {}
+    motion_values = with_outputs(solve(mechanism, instants, order, strict=False))[1] if of_motion else {}
     outputs = []
     for name, output in mechanism.outputs.items():
         if isinstance(output, AbstractMotionOutput):
-            values = known[name]
+            values = motion_values[name]
             count = values.shape[2] if values.ndim == 3 else 1
         elif getattr(output, "turning", False):  # counted from the assembled configuration
             count = 1
@@ -351,13 +351,13 @@ class Torques(Problem):
                 raise RobotError(message, name=f"vary {name}", value=float(values.min()))
         linear = [name for name in designs if name != "speed"]
         speed = np.unique(designs["speed"]) if "speed" in designs else np.ones(1)
-        which = np.searchsorted(speed, designs["speed"]) if "speed" in designs else np.zeros(count, int)
-        bare = _with(dict.fromkeys(linear, 0.0), self.robot)
-        base = self._torques(bare, speed)
-        torques = base[which]
+        speed_index = np.searchsorted(speed, designs["speed"]) if "speed" in designs else np.zeros(count, int)
+        unloaded = _with(dict.fromkeys(linear, 0.0), self.robot)
+        base = self._torques(unloaded, speed)
+        torques = base[speed_index]
         for name in linear:
-            share = self._torques(_with({name: 1.0}, bare), speed) - base
-            torques = torques + designs[name][:, None, None, None] * share[which]
+            slope = self._torques(_with({name: 1.0}, unloaded), speed) - base
+            torques = torques + designs[name][:, None, None, None] * slope[speed_index]
         instant_count, breaks = len(self.instants), self._instants_looked_at[1]
         values = {name: torques[:, :instant_count, :, k] for k, name in enumerate(self.robot.joint_names)}
         one_sided = {name: torques[:, instant_count:, :, k] for k, name in enumerate(self.robot.joint_names)}
@@ -368,10 +368,10 @@ class Torques(Problem):
     @functools.cached_property
     def _instants_looked_at(self) -> tuple[Float[np.ndarray, " look"], Float[np.ndarray, " side"]]:
         """Return the instants, then those on both sides of breaks of laws, and the breaks of the latter."""
-        first, last = float(self.instants[0]), float(self.instants[-1])
-        breaks = law_breaks(self.trajectory.laws.values(), first, last, self.rates + 2)
-        sides, which = both_sides(breaks, first, last)
-        return np.concatenate([self.instants, sides]), breaks[which]
+        start, stop = float(self.instants[0]), float(self.instants[-1])
+        breaks = law_breaks(self.trajectory.laws.values(), start, stop, self.rates + 2)
+        sides, indices = both_sides(breaks, start, stop)
+        return np.concatenate([self.instants, sides]), breaks[indices]
 
     def _torques(self, robot: Robot, speed: Float[np.ndarray, " speed"]) -> Float[np.ndarray, "speed look rate joint"]:
         followed = FollowedTrajectory(robot, self.trajectory)

@@ -60,49 +60,43 @@ def variables_of(
     for quantity in quantities:
         dims = ("derivative", *(axis for axis, _ in quantity.axes))
         shape = (levels, *quantity.shape)
-        for kind, words in STATISTICS.items():
+        for kind, template in STATISTICS.items():
             units = "s" if kind == "peak_time" else quantity.units
-            attributes = {"units": units, "long_name": words.format(quantity.name)}
+            attributes = {"units": units, "long_name": template.format(quantity.name)}
             variables.append(Variable(f"{quantity.name}_{kind}", dims, shape, "f8", attributes))
         if histories:
             attributes = {"units": quantity.units, "long_name": quantity.name}
             variables.append(Variable(quantity.name, ("time", *dims), (instants, *shape), "f8", attributes))
-    taken = {"time", "derivative", "design", *(axis for quantity in quantities for axis, _ in quantity.axes)}
+    taken_names = {"time", "derivative", "design", *(axis for quantity in quantities for axis, _ in quantity.axes)}
     for variable in variables:
-        if variable.name in taken:
+        if variable.name in taken_names:
             message = f"two arrays of the result would be called {variable.name}; give the output another name"
             raise MechanismError(message, name=f"outputs.{variable.name}")
-        taken.add(variable.name)
-    named = {name: name if name not in taken else f"parameter_{name}" for name in parameters}
-    return [*(Variable(named[name], (), (), "f8", {"long_name": name}) for name in parameters), *variables]
+        taken_names.add(variable.name)
+    array_names = {name: name if name not in taken_names else f"parameter_{name}" for name in parameters}
+    return [*(Variable(array_names[name], (), (), "f8", {"long_name": name}) for name in parameters), *variables]
 
 
 def stored_values(
-    histories_given: Histories, quantities: Sequence[Quantity], levels: int, instants: np.ndarray, *, histories: bool
+    results: Histories, quantities: Sequence[Quantity], levels: int, instants: np.ndarray, *, histories: bool
 ) -> dict[str, np.ndarray]:
     """Return the arrays of some designs, by name; designs not solved at all instants have no statistics."""
-    count = len(histories_given.status)
-    bad = histories_given.status != Status.OK
-    first = np.take_along_axis(histories_given.status, np.argmax(bad, axis=1)[:, None], axis=1)[:, 0]
+    count = len(results.status)
+    is_failed = results.status != Status.OK
+    first = np.take_along_axis(results.status, np.argmax(is_failed, axis=1)[:, None], axis=1)[:, 0]
     stored: dict[str, np.ndarray] = {
-        "failed_instants": bad.sum(axis=1).astype("i4"),
+        "failed_instants": is_failed.sum(axis=1).astype("i4"),
         "first_status": first.astype("i1"),
     }
     if histories:
-        stored["status"] = histories_given.status.astype("i1")
+        stored["status"] = results.status.astype("i1")
     for quantity in quantities:
-        values = histories_given.values.get(quantity.name)
+        values = results.values.get(quantity.name)
         if values is None:  # none of the designs was solved
             values = np.full((count, len(instants), levels, *quantity.shape), np.nan)
-        sides = (
-            None
-            if histories_given.sides is None or quantity.name not in histories_given.sides.values
-            else histories_given.sides
-        )
-        values_of = statistics(
-            values, instants, histories_given.pace, sides and (sides.values[quantity.name], sides.instants)
-        )
-        stored |= {f"{quantity.name}_{kind}": x for kind, x in values_of.items()}
+        sides = None if results.sides is None or quantity.name not in results.sides.values else results.sides
+        summary = statistics(values, instants, results.pace, sides and (sides.values[quantity.name], sides.instants))
+        stored |= {f"{quantity.name}_{kind}": x for kind, x in summary.items()}
         if histories:
             stored[quantity.name] = values
     return stored
@@ -134,31 +128,31 @@ def statistics(
     """
     series = np.moveaxis(values, (0, 1), (-2, -1))  # the memory layout of families, so that nothing is copied
     low, high, size = series.min(axis=-1), series.max(axis=-1), np.abs(series)
-    at = np.argmax(size, axis=-1)
-    peak = np.take_along_axis(size, at[..., None], axis=-1)[..., 0]
+    index = np.argmax(size, axis=-1)
+    peak = np.take_along_axis(size, index[..., None], axis=-1)[..., 0]
     scale = np.where(peak > 0, peak, 1.0)  # squares of large numbers would overflow
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         size /= scale[..., None]
         mean = np.einsum("t,...t,...t->...", _weights(instants), size, size)
-    low, high, at, peak, rms = (np.moveaxis(x, -1, 0) for x in (low, high, at, peak, scale * np.sqrt(mean)))
-    unknown, when = np.isnan(peak), instants[at]
+    low, high, index, peak, rms = (np.moveaxis(x, -1, 0) for x in (low, high, index, peak, scale * np.sqrt(mean)))
+    is_unknown, times = np.isnan(peak), instants[index]
     if sides is not None and sides[0].shape[1]:
-        more, their = sides
-        low = np.where(unknown, low, np.fmin(low, np.fmin.reduce(more, axis=1)))
-        high = np.where(unknown, high, np.fmax(high, np.fmax.reduce(more, axis=1)))
-        sizes = np.nan_to_num(np.abs(more), nan=-np.inf)
-        at = np.argmax(sizes, axis=1)
-        larger = np.take_along_axis(sizes, at[:, None], axis=1)[:, 0]
-        instant = np.take_along_axis(their, at.reshape(len(at), -1), axis=1).reshape(at.shape)
-        when = np.where(larger > peak, instant, when)
+        side_values, side_times = sides
+        low = np.where(is_unknown, low, np.fmin(low, np.fmin.reduce(side_values, axis=1)))
+        high = np.where(is_unknown, high, np.fmax(high, np.fmax.reduce(side_values, axis=1)))
+        sizes = np.nan_to_num(np.abs(side_values), nan=-np.inf)
+        index = np.argmax(sizes, axis=1)
+        larger = np.take_along_axis(sizes, index[:, None], axis=1)[:, 0]
+        instant = np.take_along_axis(side_times, index.reshape(len(index), -1), axis=1).reshape(index.shape)
+        times = np.where(larger > peak, instant, times)
         peak = np.where(larger > peak, larger, peak)
     if pace is not None:
-        when = instants[0] + (when - instants[0]) / pace.reshape(-1, *[1] * (when.ndim - 1))
+        times = instants[0] + (times - instants[0]) / pace.reshape(-1, *[1] * (times.ndim - 1))
     return {
         "peak": peak,
-        "peak_time": np.where(unknown, np.nan, when),
-        "rms": np.where(unknown, np.nan, rms),
+        "peak_time": np.where(is_unknown, np.nan, times),
+        "rms": np.where(is_unknown, np.nan, rms),
         "min": low,
         "max": high,
     }

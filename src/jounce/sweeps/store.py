@@ -119,9 +119,9 @@ class Store:
 
     def is_whole(self, chunk: int, start: int, count: int) -> bool:
         """Return whether the arrays of a finished chunk of `count` designs are unchanged."""
-        parts = [self._part(name, chunk) for name in self._arrays]
+        paths = [self._part(name, chunk) for name in self._arrays]
         try:
-            if any(part.exists() and not part.is_file() for part in parts):  # chunks of fill values have no file
+            if any(path.exists() and not path.is_file() for path in paths):  # chunks of fill values have no file
                 return False
             arrays = {name: array[start : start + count] for name, array in self._arrays.items()}
             digest = read_file(self._mark(chunk), DIGEST, is_input=False)
@@ -170,13 +170,13 @@ class Store:
             return content
         expected = json.loads(content)
         try:
-            present = parsed(existing, path)
+            current = parsed(existing, path)
         except OutputError:
             return content
-        if path.parent == self.folder and isinstance(attributes := present.get("attributes"), dict):
-            own = {name: attributes.get(name) for name in ("manifest", "checksum")}
-            expected["attributes"] = attributes | expected["attributes"] | own
-        return None if present == expected else json.dumps(expected, indent=1).encode()
+        if path.parent == self.folder and isinstance(attributes := current.get("attributes"), dict):
+            kept_attributes = {name: attributes.get(name) for name in ("manifest", "checksum")}
+            expected["attributes"] = attributes | expected["attributes"] | kept_attributes
+        return None if current == expected else json.dumps(expected, indent=1).encode()
 
     def forget(self, chunk: int) -> None:
         """Mark a chunk as not done, so that it is computed again.
@@ -191,9 +191,9 @@ class Store:
 
     def done(self, count: int) -> np.ndarray:
         """Return the mask of chunks on the disk."""
-        done = np.zeros(count, bool)
-        done[[chunk for chunk in map(int, self._marked()) if chunk < count]] = True
-        return done
+        is_done = np.zeros(count, bool)
+        is_done[[chunk for chunk in map(int, self._marked()) if chunk < count]] = True
+        return is_done
 
     def is_empty(self) -> bool:
         """Return whether the folder contains only its initial files."""
@@ -201,8 +201,8 @@ class Store:
             return False
         with naming_path(self.folder):
             entries = [entry for entry in self.folder.iterdir() if not entry.name.startswith(SCRATCH)]
-            own = {ROOT: True} | {x.name: is_blank(x) for x in entries if x.is_dir() and not x.is_symlink()}
-        return all(own.get(entry.name, False) for entry in entries)
+            is_own = {ROOT: True} | {x.name: is_blank(x) for x in entries if x.is_dir() and not x.is_symlink()}
+        return all(is_own.get(entry.name, False) for entry in entries)
 
     def remove(self) -> None:
         """Remove the folder; no other process may be writing to it."""
@@ -327,25 +327,25 @@ def find(folder: Path) -> Store | None:
     if folder.suffix.lower() != SUFFIX:
         raise OutputError(f"a sweep is written to a folder whose name ends in {SUFFIX}", path=str(folder))
     try:
-        real = Path(os.path.realpath(folder))
-        if not real.parent.is_dir():
-            raise OutputError(f"the folder {real.parent} does not exist", path=str(folder))
-        for above in real.parents:
-            if is_sweep(above):
-                message = f"the folder {above} above is that of another sweep; give a name outside of it"
+        real_path = Path(os.path.realpath(folder))
+        if not real_path.parent.is_dir():
+            raise OutputError(f"the folder {real_path.parent} does not exist", path=str(folder))
+        for parent in real_path.parents:
+            if is_sweep(parent):
+                message = f"the folder {parent} above is that of another sweep; give a name outside of it"
                 raise OutputError(message, path=str(folder))
-        if not real.exists() or (real.is_dir() and not any(real.iterdir())):
-            if not os.access(real.parent, os.W_OK | os.X_OK):
+        if not real_path.exists() or (real_path.is_dir() and not any(real_path.iterdir())):
+            if not os.access(real_path.parent, os.W_OK | os.X_OK):
                 raise OutputError("nothing may be written in the folder above", path=str(folder))
             return None
     except (OSError, ValueError) as error:
         raise OutputError(f"cannot be read: {reason_of(error)}", path=str(folder)) from None
     try:
-        present = "manifest" in attributes_in(folder / ROOT)
+        has_manifest = "manifest" in attributes_in(folder / ROOT)
         reason = f"{ROOT} has no manifest"
     except OutputError as error:
-        present, reason = False, f"{ROOT}: {error.message}"
-    if not present:
+        has_manifest, reason = False, f"{ROOT}: {error.message}"
+    if not has_manifest:
         message = f"what is there is not a sweep of jounce, or is a damaged one ({reason}); give another name"
         raise OutputError(message, path=str(folder))
     store = Store(folder)
@@ -361,8 +361,8 @@ def create(folder: Path, files: Mapping[str, bytes]) -> Store:
     OutputError
         If the folder cannot be written.
     """
-    real = Path(os.path.realpath(folder))
-    scratch = real.with_name(f".jounce-{secrets.token_hex(6)}")
+    real_path = Path(os.path.realpath(folder))
+    scratch = real_path.with_name(f".jounce-{secrets.token_hex(6)}")
     try:
         with naming_path(folder), cleanup_on_signal(lambda: shutil.rmtree(scratch, ignore_errors=True)):
             for name, content in files.items():
@@ -371,8 +371,8 @@ def create(folder: Path, files: Mapping[str, bytes]) -> Store:
                 path.write_bytes(content)
             for path in scratch.rglob("*"):
                 _sync(path)
-            scratch.rename(real)
-            _sync(real.parent)
+            scratch.rename(real_path)
+            _sync(real_path.parent)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
     return Store(folder)

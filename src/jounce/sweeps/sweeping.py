@@ -157,9 +157,9 @@ def prepare(
     check_installed("zarr")
     existing = find(folder)
     variations = read_variations(vary, problem.reader)
-    unknown = [name for name in variations if name not in problem.nominal]
-    if unknown:
-        problem.reader(unknown[0], "0")  # raises the error with the known names
+    unknown_names = [name for name in variations if name not in problem.nominal]
+    if unknown_names:
+        problem.reader(unknown_names[0], "0")  # raises the error with the known names
     space = sample_space(variations, sample, problem.nominal)
     quantities = problem.quantities()
     instants = problem.instants
@@ -197,22 +197,22 @@ def run(
     store = plan.store
     with store.locked():
         store.clear()
-        done = _whole(plan)
-        tracker = _Progress(plan, sum(map(plan.size, np.flatnonzero(done).tolist())), progress)
-        left = (chunk for chunk in range(plan.chunks) if not done[chunk])
-        if not done.all():
+        is_done = _whole(plan)
+        tracker = _Progress(plan, sum(map(plan.size, np.flatnonzero(is_done).tolist())), progress)
+        queue = (chunk for chunk in range(plan.chunks) if not is_done[chunk])
+        if not is_done.all():
             with tracker.resumable():
                 if workers == 0 and scheduler is None:
-                    for chunk in left:
+                    for chunk in queue:
                         plan.compute(chunk)
                         tracker(chunk)
                 else:
                     check_installed("zarr", "distributed")
                     processes = None if workers is None else whole_number("workers", workers, 1, error=JounceError)
-                    where = {"scheduler": scheduler, "workers": processes, "timeout": timeout}
+                    setup = {"scheduler": scheduler, "workers": processes, "timeout": timeout}
                     with store.scratch() as scratch:
-                        where["scratch"] = scratch
-                        compute_on_cluster(plan, left, tracker, **where, user_files=user_files, prepare=prepare_worker)
+                        setup["scratch"] = scratch
+                        compute_on_cluster(plan, queue, tracker, **setup, user_files=user_files, prepare=prepare_worker)
         return store.finish(plan.chunks)
 
 
@@ -225,16 +225,16 @@ def _whole(plan: Plan) -> Bool[np.ndarray, " chunk"]:
     if changed := store.restore(plan.files(store.manifest)):
         message = f"{plan.folder}: files of {', '.join(changed)} were lost or changed since, which are written again"
         warnings.warn(DamageWarning(message), stacklevel=2)
-    done = store.done(plan.chunks)
-    damaged = [k for k in np.flatnonzero(done).tolist() if not store.is_whole(k, k * plan.chunk, plan.size(k))]
+    is_done = store.done(plan.chunks)
+    damaged = [k for k in np.flatnonzero(is_done).tolist() if not store.is_whole(k, k * plan.chunk, plan.size(k))]
     for chunk in damaged:
         store.forget(chunk)
-        done[chunk] = False
+        is_done[chunk] = False
     if damaged:
         count = sum(map(plan.size, damaged))
         message = f"{plan.folder}: files of {count} designs were lost or changed since, which are computed again"
         warnings.warn(DamageWarning(message), stacklevel=2)
-    return done
+    return is_done
 
 
 def opened(folder: Path) -> "xarray.Dataset":
@@ -282,16 +282,16 @@ def _problem(
 ) -> tuple[Problem, str]:
     """Return the problem of a sweep, and its title."""
     model = _read(model) if isinstance(model, str | PathLike) else model
-    given = {} if tolerance is None else {"tolerance": tolerance}
+    options = {} if tolerance is None else {"tolerance": tolerance}
     if isinstance(model, Robot):
         return robot_problem(model, trajectory, time, order), model.name
     if trajectory is not None:
         raise TrajectoryError("a trajectory goes with a robot, not with a mechanism", name="trajectory")
     if simulate:
-        return Simulations(model, time, order, **given, method=method), _title(model)
+        return Simulations(model, time, order, **options, method=method), _title(model)
     if method is not None:
         raise MechanismError("a method goes with a simulation: simulate=True", name="method", value=method)
-    return Motions(model, time, order, **given), _title(model)
+    return Motions(model, time, order, **options), _title(model)
 
 
 def robot_problem(
@@ -326,8 +326,8 @@ def _chunk(given: int | None, existing: Store | None, count: int, quantities: Se
     if existing is not None:
         return existing.manifest["options"]["chunk"]
     numbers = rows * sum(math.prod(quantity.shape) for quantity in quantities)
-    largest = min(USUAL_CHUNK, NUMBERS // numbers, max(4 * SMALLEST_CHUNK, -(-count // LEAST_CHUNKS)))
-    return 1 << max(SMALLEST_CHUNK, largest).bit_length() - 1
+    max_count = min(USUAL_CHUNK, NUMBERS // numbers, max(4 * SMALLEST_CHUNK, -(-count // LEAST_CHUNKS)))
+    return 1 << max(SMALLEST_CHUNK, max_count).bit_length() - 1
 
 
 def _has_dask() -> bool:
