@@ -73,8 +73,8 @@ class ExpressionLaw(AbstractLaw):
 
     def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Quantity:
         """Return the value of the expression."""
-        moving = _named(self.displacements, displacement) | _named(self.velocities, velocity)
-        return self.expression.evaluate({**self.parameters, "t": time, **moving})
+        motion_values = _named(self.displacements, displacement) | _named(self.velocities, velocity)
+        return self.expression.evaluate({**self.parameters, "t": time, **motion_values})
 
 
 class TimeLaw(AbstractLaw):
@@ -138,8 +138,8 @@ class VectorLaw(AbstractLaw):
 
     def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
         """Return the jet of the force, a vector."""
-        parts = [part.value(displacement, velocity, time) for part in self.parts]
-        return stack([_broadcast_to_jet(part, displacement[0], time) for part in parts])
+        components = [component.value(displacement, velocity, time) for component in self.parts]
+        return stack([_broadcast_to_jet(component, displacement[0], time) for component in components])
 
 
 class ReadLaw(AbstractLaw):

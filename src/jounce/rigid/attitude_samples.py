@@ -56,9 +56,9 @@ class AttitudeSamples:
         times, quaternions = _numbers(times, by_component("quaternions", quaternions, TrajectoryError), "quaternions")
         _check_times(times, quaternions, "quaternions", (4,), degree)
         length = np.linalg.norm(quaternions, axis=1)
-        bad = np.abs(length - 1) > UNIT
-        if bad.any():
-            first = int(np.flatnonzero(bad)[0])
+        is_off = np.abs(length - 1) > UNIT
+        if is_off.any():
+            first = int(np.flatnonzero(is_off)[0])
             message = (
                 f"a rotation needs a quaternion of unit length; that of sample {first} is of length {length[first]:.9g}"
             )
@@ -66,13 +66,13 @@ class AttitudeSamples:
         quaternions = _continuous(times, quaternions / length[:, None])
         from scipy.interpolate import PPoly, make_interp_spline  # imported late, as importing SciPy takes half a second
 
-        each = [PPoly.from_spline(make_interp_spline(times, component, k=degree)) for component in quaternions.T]
-        inside = np.diff(each[0].x) > 0
+        splines = [PPoly.from_spline(make_interp_spline(times, component, k=degree)) for component in quaternions.T]
+        is_inner = np.diff(splines[0].x) > 0
         self.start, self.stop = float(times[0]), float(times[-1])
         self.degree = degree
-        self._breakpoints = each[0].x[:-1][inside]
+        self._breakpoints = splines[0].x[:-1][is_inner]
         # (power, component, piece), lowest power first
-        self._coefficients = np.stack([pieces.c[::-1, inside] for pieces in each], axis=1)
+        self._coefficients = np.stack([spline.c[::-1, is_inner] for spline in splines], axis=1)
 
     @classmethod
     def from_rotation_matrices(cls, times: ArrayLike, matrices: ArrayLike, degree: int = 5) -> "AttitudeSamples":
@@ -136,9 +136,9 @@ class AttitudeSamples:
             )
             raise TrajectoryError(message, name="order", value=time.order)
         self._check_range(instants)
-        piece = last_begun(self._breakpoints, instants)
-        local = time - jnp.asarray(self._breakpoints)[piece]
-        powers = jnp.asarray(self._coefficients)[..., piece]  # (power, component, ...)
+        index = last_begun(self._breakpoints, instants)
+        local = time - jnp.asarray(self._breakpoints)[index]
+        powers = jnp.asarray(self._coefficients)[..., index]  # (power, component, ...)
         value = Jet.constant(powers[-1], time.order)
         for c in powers[-2::-1]:
             value = value * local + c
@@ -166,10 +166,10 @@ class AttitudeSamples:
         scalar, vector = quaternion[0], quaternion[1:]
         batch = (1,) * (len(quaternion.shape) - 1)
 
-        def turned(axis: Numbers) -> Jet:
+        def rotated(axis: Numbers) -> Jet:
             return 2.0 * cross(vector, cross(vector, axis) + scalar * axis) + axis
 
-        return transpose(stack([turned(jnp.reshape(axis, (3, *batch))) for axis in jnp.eye(3)]))
+        return transpose(stack([rotated(jnp.reshape(axis, (3, *batch))) for axis in jnp.eye(3)]))
 
     def angular_velocity(self, time: Float[Jet, "*batch"], frame: str = "global") -> Float[Jet, "3 *batch"]:
         """Return the angular velocity and its derivatives at the instants of a time jet.
@@ -197,10 +197,10 @@ class AttitudeSamples:
     def _check_range(self, instants: Real) -> None:
         if is_traced(instants):
             return
-        outside = ~((np.asarray(instants) >= self.start) & (np.asarray(instants) <= self.stop))
-        if outside.any():
+        is_outside = ~((np.asarray(instants) >= self.start) & (np.asarray(instants) <= self.stop))
+        if is_outside.any():
             message = f"the samples reach from {self.start:g} to {self.stop:g} s; there is no attitude outside of them"
-            raise TrajectoryError(message, name="time", value=float(np.asarray(instants)[outside].flat[0]))
+            raise TrajectoryError(message, name="time", value=float(np.asarray(instants)[is_outside].flat[0]))
 
 
 def _numbers(times: ArrayLike, values: ArrayLike, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -212,12 +212,12 @@ def _check_times(times: np.ndarray, samples: np.ndarray, name: str, shape: tuple
         expected = ", ".join(map(str, ("samples", *shape)))
         message = f"samples need one entry for each time: times of shape (samples,) and {name} of shape ({expected})"
         raise TrajectoryError(message, name=name, value=f"shapes {times.shape} and {samples.shape}")
-    for what, values in (("times", times), (name, samples)):
+    for argument, values in (("times", times), (name, samples)):
         finite = np.isfinite(values).reshape(len(values), -1).all(axis=1)
         if not finite.all():
             first = int(np.flatnonzero(~finite)[0])
             message = f"samples must be finite numbers; sample {first} is not"
-            raise TrajectoryError(message, name=what, value=values[first].tolist())
+            raise TrajectoryError(message, name=argument, value=values[first].tolist())
     if (np.diff(times) <= 0).any():
         first = int(np.flatnonzero(np.diff(times) <= 0)[0])
         message = f"times of samples must increase; sample {first + 1} does not come after sample {first}"
@@ -235,14 +235,14 @@ def _continuous(
     times: Float[np.ndarray, " sample"], quaternions: Float[np.ndarray, "sample 4"]
 ) -> Float[np.ndarray, "sample 4"]:
     """Return quaternions with the signs that bring neighbors closest; both signs are the same rotation."""
-    along = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
-    unknown = np.abs(along) < UNIT
-    if unknown.any():
-        first = int(np.flatnonzero(unknown)[0])
+    cosines = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
+    is_ambiguous = np.abs(cosines) < UNIT
+    if is_ambiguous.any():
+        first = int(np.flatnonzero(is_ambiguous)[0])
         message = (
             f"between samples {first} and {first + 1} the body makes half a turn, to one side or to the other; "
             "give samples closer in time"
         )
         raise TrajectoryError(message, name="times", value=times[first : first + 2].tolist())
-    signs = np.concatenate([[1.0], np.cumprod(np.sign(along))])
+    signs = np.concatenate([[1.0], np.cumprod(np.sign(cosines))])
     return quaternions * signs[:, None]

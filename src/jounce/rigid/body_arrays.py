@@ -31,11 +31,11 @@ def take_bodies(jet: Jet, bodies: tuple[int, ...]) -> Jet:
 
 def _taken(array: Float[Numbers, "*components bodies batch"], bodies: tuple[int, ...]) -> Any:
     """Select bodies by slices if indices are equal or evenly spaced, since XLA fuses slices, but not a gather."""
-    first, *others = bodies
-    stride = others[0] - first if others else 1
+    first, *more_bodies = bodies
+    stride = more_bodies[0] - first if more_bodies else 1
     if len(set(bodies)) == 1:
-        one = jax.lax.slice_in_dim(array, first, first + 1, axis=jnp.ndim(array) - 2)
-        return jnp.broadcast_to(one, (*one.shape[:-2], len(bodies), one.shape[-1]))
+        single = jax.lax.slice_in_dim(array, first, first + 1, axis=jnp.ndim(array) - 2)
+        return jnp.broadcast_to(single, (*single.shape[:-2], len(bodies), single.shape[-1]))
     if stride > 0 and bodies == tuple(range(first, bodies[-1] + 1, stride)):
         return jax.lax.slice_in_dim(array, first, bodies[-1] + 1, stride, axis=jnp.ndim(array) - 2)
     return jnp.asarray(array).at[..., np.array(bodies), :].get(mode="promise_in_bounds")
@@ -48,5 +48,5 @@ def body_vector(local: JetLike, batch_axes: int) -> Any:
     local = real_or_traced("vector", local, JounceError)
     if not isinstance(local, jax.Array | np.ndarray):
         local = np.asarray(local, float)
-    missing = 1 + batch_axes - local.ndim
-    return local.reshape(*local.shape, *[1] * missing) if missing > 0 else local
+    missing_axes = 1 + batch_axes - local.ndim
+    return local.reshape(*local.shape, *[1] * missing_axes) if missing_axes > 0 else local

@@ -78,27 +78,27 @@ def euler_parameters(orientation: Any) -> Quaternion:
     return from_axis_angle(_numbers(orientation["axis"], 3, "the axis"), angle)
 
 
-def _numbers(values: Any, count: int, what: str) -> list[float]:
-    """Return finite numbers, or raise a MechanismError that names them as `what`."""
-    if what != "the Euler angles":  # these follow the order of the rotations, whatever their labels
+def _numbers(values: Any, count: int, phrase: str) -> list[float]:
+    """Return finite numbers, or raise a MechanismError that names them as `phrase`."""
+    if phrase != "the Euler angles":  # these follow the order of the rotations, whatever their labels
         values = by_component(None, values, MechanismError)
     try:
         numbers = [float(value) for value in values]
     except (TypeError, ValueError):
         numbers = []
     if isinstance(values, str) or len(numbers) != count:
-        raise MechanismError(f"{what} must be {'one number' if count == 1 else f'{count} numbers'}", value=values)
+        raise MechanismError(f"{phrase} must be {'one number' if count == 1 else f'{count} numbers'}", value=values)
     if not all(map(math.isfinite, numbers)):
-        raise MechanismError(f"{what} must be finite", value=numbers)
+        raise MechanismError(f"{phrase} must be finite", value=numbers)
     return numbers
 
 
-def _unit(vector: Sequence[float], what: str) -> tuple[float, ...]:
+def _unit(vector: Sequence[float], phrase: str) -> tuple[float, ...]:
     size = math.hypot(*vector)
     if size == 0:
-        raise MechanismError(f"{what} must not be of zero length", value=list(vector))
+        raise MechanismError(f"{phrase} must not be of zero length", value=list(vector))
     if not math.isfinite(size):
-        raise MechanismError(f"{what} must be finite", value=list(vector))
+        raise MechanismError(f"{phrase} must be finite", value=list(vector))
     return tuple(component / size for component in vector)
 
 
@@ -121,8 +121,8 @@ def from_quaternion(quaternion: Sequence[float]) -> Quaternion:
     (1.0, 0.0, 0.0, 0.0)
     """
     unit = _unit(quaternion, "the Euler parameters")
-    near = abs(math.hypot(*quaternion) - 1) < 1e-15  # values written in full are kept unchanged
-    e0, e1, e2, e3 = map(float, quaternion) if near else unit
+    is_unit = abs(math.hypot(*quaternion) - 1) < 1e-15  # values written in full are kept unchanged
+    e0, e1, e2, e3 = map(float, quaternion) if is_unit else unit
     return (e0, e1, e2, e3)
 
 

@@ -25,13 +25,13 @@ class AbstractFrame:
 
     def direction(self, local: JetLike) -> Float[Jet, "3 *batch"]:
         """Return a vector of the moving frame in components of the base: Sommer 2024, equations 71-72."""
-        parts = components(body_vector(local, len(self.position.shape) - 1))
-        return total(axis * part for axis, part in zip(self.axes, parts, strict=True))
+        coordinates = components(body_vector(local, len(self.position.shape) - 1))
+        return total(axis * coordinate for axis, coordinate in zip(self.axes, coordinates, strict=True))
 
     def to_body(self, vector: Jet | Numbers | Refused) -> Float[Jet, "3 *batch"]:
         """Return the components, in the moving frame, of a vector given in the frame of the base."""
-        given: Any = vector if isinstance(vector, Jet) else real_or_traced("vector", vector, JounceError)
-        return stack([dot(axis, given) for axis in self.axes])
+        checked: Any = vector if isinstance(vector, Jet) else real_or_traced("vector", vector, JounceError)
+        return stack([dot(axis, checked) for axis in self.axes])
 
     @property
     def attitude(self) -> Float[Jet, "3 3 *batch"]:
@@ -61,10 +61,10 @@ class Frames(AbstractFrame):
     def take(self, index: Int[Numbers, ""] | int) -> "Frames":
         """Return one of several frames, by its index along the axis after the components."""
 
-        def taken(coefficient: Any) -> Any:
+        def taken_at(coefficient: Any) -> Any:
             return jax.lax.dynamic_index_in_dim(coefficient, index, axis=1, keepdims=False)
 
-        return jax.tree.map(taken, self)
+        return jax.tree.map(taken_at, self)
 
     def without_base(self) -> "Frames":
         """Return all of several frames but the last one."""

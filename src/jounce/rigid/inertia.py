@@ -81,13 +81,13 @@ class Inertia:
     @property
     def fault(self) -> "Fault | None":
         """Fault of mass and tensor by which no real body has them; None if there is none."""
-        small, middle, large = (float(x) for x in np.linalg.eigvalsh(self.tensor))
+        smallest, middle, largest = (float(x) for x in np.linalg.eigvalsh(self.tensor))
         if not self.mass and self.tensor.any():
             return Fault(WITHOUT_MASS, self.tensor.tolist())
-        if small < -ROUNDING * max(large, -small):
-            return Fault(NEGATIVE, small)
-        if large - small - middle > ROUNDING * large:
-            return Fault(TRIANGLE, [small, middle, large])
+        if smallest < -ROUNDING * max(largest, -smallest):
+            return Fault(NEGATIVE, smallest)
+        if largest - smallest - middle > ROUNDING * largest:
+            return Fault(TRIANGLE, [smallest, middle, largest])
         return None
 
     @property
@@ -249,7 +249,7 @@ class TracedInertia(Inertia):
         return None
 
 
-def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:
+def check_solid(kind: str, axis: str, values: dict[str, Any]) -> str:
     """Return the axis of a solid, by default its own, after checking kind, axis, sizes and mass or density.
 
     Raises
@@ -260,13 +260,13 @@ def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:
     check_choice("solid", kind, SOLIDS, RobotError)
     solid = SOLIDS[kind]
     valid = (*solid.sizes, "mass", "density")
-    for name in given:
+    for name in values:
         if name not in valid:
             raise RobotError(f"a {kind} has no such size; {did_you_mean(name, valid)}", name=name)
     for name in solid.sizes:
-        if given.get(name) is None:
+        if values.get(name) is None:
             raise RobotError("is missing", name=name)
-    mass, density = given.get("mass"), given.get("density")
+    mass, density = values.get("mass"), values.get("density")
     thin = kind in ("rod", "disc")
     if mass is None and density is None:
         raise RobotError(f"a {kind} needs a mass{'' if thin else ' or a density'}", name="mass")
@@ -275,20 +275,20 @@ def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:
     if mass is not None and density is not None:
         raise RobotError(f"a {kind} takes a mass or a density, not both", name="density", value=density)
     if axis and (not solid.axis or axis not in ("x", "y", "z")):
-        words = "the axis is x, y or z" if solid.axis else f"a {kind} has no axis"
-        raise RobotError(words, name="axis", value=axis)
-    _check_sizes({name: value for name, value in given.items() if value is not None})
+        message = "the axis is x, y or z" if solid.axis else f"a {kind} has no axis"
+        raise RobotError(message, name="axis", value=axis)
+    _check_sizes({name: value for name, value in values.items() if value is not None})
     return axis or solid.axis
 
 
-def _check_sizes(given: dict[str, Any]) -> None:
-    for name, value in given.items():
+def _check_sizes(values: dict[str, Any]) -> None:
+    for name, value in values.items():
         numbers = finite_numbers(name, value, (3,) if name == "size" else ())
         if not (numbers > 0).all() and name != "inner_radius":
             raise RobotError("must be greater than zero", name=name, value=numbers.tolist())
-    if "inner_radius" in given and not 0 <= given["inner_radius"] < given["radius"]:
+    if "inner_radius" in values and not 0 <= values["inner_radius"] < values["radius"]:
         message = "the inner radius of a tube is at least zero and less than its radius"
-        raise RobotError(message, name="inner_radius", value=float(given["inner_radius"]))
+        raise RobotError(message, name="inner_radius", value=float(values["inner_radius"]))
 
 
 def finite_numbers(

@@ -65,12 +65,12 @@ def transfer_matrix(sequence: str, angles: JetLike, frame: str = "global") -> An
     # in the global frame, an axis is rotated by the rotations before it (moving axes) or after it (fixed axes); in the
     # body
     # frame, by the inverses of the others
-    before = is_moving(sequence) == (frame == "global")
+    by_preceding = is_moving(sequence) == (frame == "global")
     if frame == "body":
         turns = [transpose(turn) for turn in turns]
     columns = []
     for k, axis in enumerate(axes):
-        for turn in turns[:k][::-1] if before else turns[k + 1 :]:
+        for turn in turns[:k][::-1] if by_preceding else turns[k + 1 :]:
             axis = matvec(turn, axis)
         columns.append(axis)
     return finish(transpose(stack(columns)))
@@ -188,19 +188,19 @@ def angle_rates(sequence: str, angles: JetLike, angular_velocity: JetLike, frame
     value = angles.coefficients[0] if isinstance(angles, Jet) else jnp.asarray(angles, float)
     regular = _regular(sequence, value, singularity_distance(sequence, value))
     # one state may meet a batch: it gets batch axes of length one
-    given = angular_velocity.coefficients[0] if isinstance(angular_velocity, Jet) else angular_velocity
-    rank = max(np.ndim(value), np.ndim(given))
+    velocity_value = angular_velocity.coefficients[0] if isinstance(angular_velocity, Jet) else angular_velocity
+    rank = max(np.ndim(value), np.ndim(velocity_value))
     angular_velocity, value = body_vector(angular_velocity, rank - 1), body_vector(value, rank - 1)
     if isinstance(angles, Jet):
         (angles, velocity), finish = uniform(angles=angles, angular_velocity=angular_velocity)
         return finish(_marked(_solved(transfer_matrix(sequence, angles, frame), velocity), regular))
     (velocity,), finish = uniform(angular_velocity=angular_velocity)
-    known = Jet([value])
+    known_angles = Jet([value])
     while True:
-        rates = _solved(transfer_matrix(sequence, known, frame), velocity.truncate(known.order)).dense()
+        rates = _solved(transfer_matrix(sequence, known_angles, frame), velocity.truncate(known_angles.order)).dense()
         if rates.order == velocity.order:
             return finish(_marked(rates, regular))
-        known = rates.integrate(value)
+        known_angles = rates.integrate(value)
 
 
 def singularity_distance(sequence: str, angles: JetLike) -> Array[Numbers, "*batch"]:
@@ -302,15 +302,15 @@ def euler_angles(sequence: str, attitude: JetLike) -> Any:
     check_rotation(matrix.coefficients[0])
     letters = sequence.lower() if is_moving(sequence) else sequence[::-1]
     i, j, k = (AXES.index(letter) for letter in letters)
-    last = 3 - i - j
+    remaining = 3 - i - j
     sign = 1.0 if (j - i) % 3 == 1 else -1.0  # whether i, j and the third axis are in cyclic order
     if i == k:
-        side = [matrix[j, i], -sign * matrix[last, i]]
-        end = [matrix[i, j], sign * matrix[i, last]]
+        side = [matrix[j, i], -sign * matrix[remaining, i]]
+        end = [matrix[i, j], sign * matrix[i, remaining]]
     else:
         side = [-sign * matrix[j, k], matrix[k, k]]
         end = [-sign * matrix[i, j], matrix[i, i]]
-    regular = _regular(sequence, None, jnp.hypot(*(part.coefficients[0] for part in side)))
+    regular = _regular(sequence, None, jnp.hypot(*(component.coefficients[0] for component in side)))
     distance = sqrt(side[0].square() + side[1].square())
     middle = atan2(distance, matrix[i, i]) if i == k else atan2(sign * matrix[i, k], distance)
     sequence_angles = [atan2(*side), middle, atan2(*end)]
@@ -327,27 +327,27 @@ def check_rotation(matrix: Numbers, name: str = "attitude") -> None:
         return
     matrices = np.moveaxis(np.asarray(matrix).reshape(3, 3, -1), -1, 0)
     with np.errstate(invalid="ignore"):  # non-finite values show in the result
-        off = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2))
-        bad = ~(off <= ORTHONORMAL) | ~(np.linalg.det(matrices) > 0)
-    if bad.any():
-        first = int(np.flatnonzero(bad)[0])
-        which = f" (number {first} of the batch)" if len(matrices) > 1 else ""
-        if not np.isfinite(off[first]):
-            what = "has entries that are not finite"
-        elif off[first] > ORTHONORMAL:
-            what = f"is not orthonormal: an entry of R^T R is {off[first]:.3g} off, more than {ORTHONORMAL:g}"
+        errors = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2))
+        is_wrong = ~(errors <= ORTHONORMAL) | ~(np.linalg.det(matrices) > 0)
+    if is_wrong.any():
+        first = int(np.flatnonzero(is_wrong)[0])
+        number_text = f" (number {first} of the batch)" if len(matrices) > 1 else ""
+        if not np.isfinite(errors[first]):
+            fault = "has entries that are not finite"
+        elif errors[first] > ORTHONORMAL:
+            fault = f"is not orthonormal: an entry of R^T R is {errors[first]:.3g} off, more than {ORTHONORMAL:g}"
         else:
-            what = "is a reflection: its determinant is negative"
-        raise JounceError(f"the matrix{which} {what}", name=name, value=matrices[first].tolist())
+            fault = "is a reflection: its determinant is negative"
+        raise JounceError(f"the matrix{number_text} {fault}", name=name, value=matrices[first].tolist())
 
 
 def _regular(sequence: str, angles: Numbers | None, distance: Numbers) -> Any:
     """Return the mask of regular orientations; raise SingularityError for a single singular one."""
     regular = distance > SINGULAR
     if np.ndim(distance) == 0 and not is_traced(regular) and not bool(regular) and not bool(jnp.isnan(distance)):
-        where = "a multiple of pi" if sequence[0] == sequence[2] else "pi/2 and a multiple of pi"
+        value = "a multiple of pi" if sequence[0] == sequence[2] else "pi/2 and a multiple of pi"
         message = (
-            f"its first and last axes are parallel where the second angle is {where}, and this orientation is only "
+            f"its first and last axes are parallel where the second angle is {value}, and this orientation is only "
             f"{float(distance):.3g} away; choose a sequence that is "
             f"{'of three different letters' if sequence[0] == sequence[2] else 'of equal first and last letters'} here"
         )
@@ -375,8 +375,8 @@ def _solved(matrix: Float[Jet, "3 3 *#batch"], vector: Float[Jet, "3 *#batch"]) 
 
 def _basis(letter: str, turn: Float[Jet, "3 3 *batch"]) -> Float[Numbers, "3 *batch"]:
     """Return a coordinate axis with the batch axes of a rotation."""
-    one = jnp.ones_like(turn.coefficients[0][0, 0])
-    return jnp.stack([one if u == letter.lower() else 0 * one for u in AXES])
+    ones = jnp.ones_like(turn.coefficients[0][0, 0])
+    return jnp.stack([ones if u == letter.lower() else 0 * ones for u in AXES])
 
 
 def _moving_jet(value: JetLike, name: str) -> Jet:

@@ -78,8 +78,8 @@ class PlanarPose:
 
     def to_body(self, vector: Jet | Numbers | Refused) -> Float[Jet, "2 *batch"]:
         """Return the body components, shape (2, ...), of a vector given in the global frame."""
-        given: Any = vector if isinstance(vector, Jet) else real_or_traced("vector", vector, JounceError)
-        return self.cosine * given - self.sine * perpendicular(given)
+        checked: Any = vector if isinstance(vector, Jet) else real_or_traced("vector", vector, JounceError)
+        return self.cosine * checked - self.sine * perpendicular(checked)
 
     def take(self, bodies: tuple[int, ...]) -> "PlanarPose":
         """Return the poses of given bodies by index; body 0 is the ground, which never moves."""

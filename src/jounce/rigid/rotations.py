@@ -61,11 +61,11 @@ def simple_rotation(axis: str, angle: JetLike) -> Any:
     check_choice("axis", letter, tuple(AXES), JounceError)
     (turn,), finish = uniform(angle=angle)
     delta = [int(letter == u) for u in AXES]  # Delta_u of equation 14; Delta_vw of equation 13 is 1 - Delta_u
-    one = Jet.constant(jnp.ones_like(turn.coefficients[0]), turn.order)
-    zero = one.map(jnp.zeros_like)
+    ones = Jet.constant(jnp.ones_like(turn.coefficients[0]), turn.order)
+    zeros = ones.map(jnp.zeros_like)
     cosine, sine = cos(turn), sin(turn)
-    c = [one if on else cosine for on in delta]  # cos(angle Delta_vw)
-    s = [sine if on else zero for on in delta]  # sin(angle Delta_u)
+    c = [ones if selected else cosine for selected in delta]  # cos(angle Delta_vw)
+    s = [sine if selected else zeros for selected in delta]  # sin(angle Delta_u)
     return finish(_rows([[c[0], -s[2], s[1]], [s[2], c[1], -s[0]], [-s[1], s[0], c[2]]]))
 
 
@@ -213,9 +213,9 @@ def checked_direction(axis: JetLike, name: str = "axis") -> Any:
 
 def unit(vector: Jet) -> list[Jet]:
     """Return the components, each of the batch's shape, of a vector scaled to unit length."""
-    parts = [part[0] for part in components(vector)]
-    length = sqrt(total(part.square() for part in parts))
-    return [part / length for part in parts]
+    coordinates = [coordinate[0] for coordinate in components(vector)]
+    length = sqrt(total(coordinate.square() for coordinate in coordinates))
+    return [coordinate / length for coordinate in coordinates]
 
 
 def uniform(**arguments: JetLike) -> tuple[list[Jet], Any]:

@@ -117,12 +117,12 @@ def screw_transform(
     batch = (1,) * len(turn.shape)
     direction = stack(unit(Jet([jnp.asarray(axis, float)]))).coefficients[0].reshape(3, *batch)
     if kind == "prismatic":
-        still = jnp.broadcast_to(jnp.eye(3).reshape(3, 3, *batch), (3, 3, *turn.shape))
-        return finish(homogeneous(Jet.constant(still, turn.order), turn * direction))
+        identity = jnp.broadcast_to(jnp.eye(3).reshape(3, 3, *batch), (3, 3, *turn.shape))
+        return finish(homogeneous(Jet.constant(identity, turn.order), turn * direction))
     moment = cross(jnp.asarray(point, float).reshape(3, *batch), direction) + pitch * direction
-    along = direction * dot(direction, moment)[None]
+    axial = direction * dot(direction, moment)[None]
     versine = 2.0 * sin(0.5 * turn).square()  # 1 - cos, without cancellation at small angles
-    shift = (turn - sin(turn)) * along + sin(turn) * moment + versine * cross(direction, moment)
+    shift = (turn - sin(turn)) * axial + sin(turn) * moment + versine * cross(direction, moment)
     return finish(homogeneous(rotation_about(axis, turn), shift))
 
 
@@ -165,12 +165,12 @@ def product_of_exponentials(screws: Sequence[ScrewAxis], coordinates: JetLike, h
         )
         raise JounceError(message, name="coordinates", value=f"shape {tuple(shape)}")
     (q,), finish = uniform(coordinates=coordinates)
-    transforms = [screw.transform(part) for screw, part in zip(screws, q, strict=True)]
+    transforms = [screw.transform(coordinate) for screw, coordinate in zip(screws, q, strict=True)]
     if home is not None:
-        last: Any = real_or_traced("home", home, JounceError)
-        if np.shape(last) != (4, 4):
-            raise JounceError("a transform needs 4 rows and 4 columns", name="home", value=f"shape {np.shape(last)}")
-        start = jnp.reshape(jnp.asarray(last, float), (4, 4, *[1] * (len(shape) - 1)))
+        matrix: Any = real_or_traced("home", home, JounceError)
+        if np.shape(matrix) != (4, 4):
+            raise JounceError("a transform needs 4 rows and 4 columns", name="home", value=f"shape {np.shape(matrix)}")
+        start = jnp.reshape(jnp.asarray(matrix, float), (4, 4, *[1] * (len(shape) - 1)))
         transforms.append(Jet.constant(start, q.order))
     return finish(reduce(matmul, transforms))
 
@@ -178,7 +178,7 @@ def product_of_exponentials(screws: Sequence[ScrewAxis], coordinates: JetLike, h
 def homogeneous(rotation: Float[Jet, "3 3 *batch"], position: Float[Jet, "3 *batch"]) -> Float[Jet, "4 4 *batch"]:
     """Return the transform ``[[R, p], [0, 1]]`` of a rotation, (3, 3, ...), and a position, (3, ...): equation 31."""
     upper = [
-        concatenate([row, part]) for row, part in zip(rotation, (position[k : k + 1] for k in range(3)), strict=True)
+        concatenate([row, entry]) for row, entry in zip(rotation, (position[k : k + 1] for k in range(3)), strict=True)
     ]
     lower = jnp.reshape(jnp.asarray([0.0, 0.0, 0.0, 1.0]), (4, *[1] * (len(position.shape) - 1)))
     return stack([*upper, Jet.constant(lower, position.order)])

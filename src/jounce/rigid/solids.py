@@ -40,8 +40,8 @@ def _sphere(radius: Any) -> tuple[Any, tuple[Any, ...]]:
 
 def _tube(radius: Any, inner_radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
     outer, inner = radius * radius, inner_radius * inner_radius
-    along = (outer + inner) / 2.0
-    return (outer - inner) * length * math.pi, (along, along / 2.0 + length * length / 12.0)
+    axial = (outer + inner) / 2.0
+    return (outer - inner) * length * math.pi, (axial, axial / 2.0 + length * length / 12.0)
 
 
 def _cylinder(radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
@@ -51,11 +51,11 @@ def _cylinder(radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
 def _capsule(radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
     """Return volume and moments of a cylinder of a given length between two half spheres."""
     balls = radius * (4.0 / 3.0)  # length of a cylinder with the volume of the half spheres
-    squared, whole = radius * radius, length + balls
-    along = (length * squared / 2.0 + balls * squared * 0.4) / whole
+    squared, full_length = radius * radius, length + balls
+    axial = (length * squared / 2.0 + balls * squared * 0.4) / full_length
     lever = squared * 0.4 + length * length / 4.0 + length * radius * 0.375
-    across = (length * (length * length / 12.0 + squared / 4.0) + balls * lever) / whole
-    return squared * whole * math.pi, (along, across)
+    transverse = (length * (length * length / 12.0 + squared / 4.0) + balls * lever) / full_length
+    return squared * full_length * math.pi, (axial, transverse)
 
 
 def _cone(radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
@@ -100,8 +100,8 @@ def solid_moments(kind: str, axis: str, sizes: dict[str, Any]) -> tuple[Any, tup
     volume, moments = SOLIDS[kind].measure(**sizes)
     if len(moments) == 3:
         return volume, (moments[0], moments[1], moments[2])
-    along, across = moments
-    x, y, z = (along if letter == axis else across for letter in "xyz")
+    axial, transverse = moments
+    x, y, z = (axial if letter == axis else transverse for letter in "xyz")
     return volume, (x, y, z)
 
 
@@ -116,4 +116,4 @@ def pseudo_parts(pseudo: Any) -> tuple[Any, list[Any], list[list[Any]]]:
     size = range(len(pseudo) - 1)
     mass, first = pseudo[-1][-1], [row[-1] for row in pseudo[:-1]]
     second = [[pseudo[i][k] - first[i] * first[k] / mass for k in size] for i in size]
-    return mass, [part / mass for part in first], second
+    return mass, [moment / mass for moment in first], second

@@ -53,7 +53,7 @@ def quaternion_change(
     quaternion: Float[Numbers, "4 *batch"], turn: Float[Numbers, "3 *batch"]
 ) -> Float[Numbers, "4 *batch"]:
     """Return the change of Euler parameters by a rotation about the body axes, rad; or its rate, given rates."""
-    return 0.5 * total(spin * part for spin, part in zip(quaternion_spins(quaternion), components(turn), strict=True))
+    return 0.5 * total(spin * angle for spin, angle in zip(quaternion_spins(quaternion), components(turn), strict=True))
 
 
 def _normalized(quaternion: Float[Numbers, "4 *batch"]) -> Float[Numbers, "4 *batch"]:
@@ -147,7 +147,7 @@ class SpatialPose(AbstractFrame):
         rates = [None] * k if velocity is None else velocity.coefficients
         w = list(zip(*(components(rate) if rate is not None else [None] * 3 for rate in rates), strict=True))
 
-        def sum_along(jet: Jet, rate: Any) -> Any:
+        def convolved(jet: Jet, rate: Any) -> Any:
             return sum_of_products(jnp.multiply, jet.coefficients[::-1], rate)
 
         def scaled(coefficient: Any, factor: float) -> Any:
@@ -155,9 +155,9 @@ class SpatialPose(AbstractFrame):
 
         axes = []
         for axis, (i, j) in zip(self.axes, ((1, 2), (2, 0), (0, 1)), strict=True):
-            turned = minus(sum_along(self.axes[i], w[j]), sum_along(self.axes[j], w[i]))
-            axes.append(axis.append(scaled(turned, 1 / k)))
-        spun = reduce(plus, (sum_along(spin, rate) for spin, rate in zip(self.spins, w, strict=True)))
+            change = minus(convolved(self.axes[i], w[j]), convolved(self.axes[j], w[i]))
+            axes.append(axis.append(scaled(change, 1 / k)))
+        spun = reduce(plus, (convolved(spin, rate) for spin, rate in zip(self.spins, w, strict=True)))
         quaternion = scaled(spun, 0.5 / k)
         changes = (None,) * 3 if quaternion is None else quaternion_spins(quaternion)
         return SpatialPose(
@@ -176,7 +176,7 @@ class SpatialPose(AbstractFrame):
         x, y, z = self.axes
         p, q, r = components(turn)
         axes = (y * r - z * q, z * p - x * r, x * q - y * p)
-        quaternion = total(spin * part for spin, part in zip(self.spins, (p, q, r), strict=True)) * 0.5
+        quaternion = total(spin * angle for spin, angle in zip(self.spins, (p, q, r), strict=True)) * 0.5
         spins = zip(*map(quaternion_spins, quaternion.dense().coefficients), strict=True)
         velocity = None
         if self.angular_velocity is not None:
@@ -251,11 +251,11 @@ def angular_product_matrices(angular_velocity: Jet) -> Float[jax.Array, "derivat
     x, y, z = components(angular_velocity.dense())
     zero = x * 0.0
     spin = stack([concatenate([zero, -z, y]), concatenate([z, zero, -x]), concatenate([-y, x, zero])])
-    one = jnp.broadcast_to(jnp.eye(3).reshape(3, 3, *[1] * (len(spin.shape) - 2)), spin.shape)
-    turned = Jet([one])
+    identity = jnp.broadcast_to(jnp.eye(3).reshape(3, 3, *[1] * (len(spin.shape) - 2)), spin.shape)
+    attitude = Jet([identity])
     for k in range(spin.order + 1):  # A' = A [w]x, from the identity
-        turned = turned.append(matmul(turned, spin.truncate(k)).dense().coefficients[k] / (k + 1))
-    matrices, rates = turned.derivatives(), spin.derivatives()
+        attitude = attitude.append(matmul(attitude, spin.truncate(k)).dense().coefficients[k] / (k + 1))
+    matrices, rates = attitude.derivatives(), spin.derivatives()
     return jnp.concatenate([matrices[:1], matrices[1:] - rates])
 
 
