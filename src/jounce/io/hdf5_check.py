@@ -65,8 +65,8 @@ def check_readable(content: bytes, path: str) -> None:
     except OSError as error:
         raise OutputError(f"cannot be read: no process can be started to look at it: {error}", path=path) from None
     if status == 3:
-        words = " ".join(message.decode(errors="replace").split())
-        raise OutputError(f"is damaged, or is not a file of results: {words}", path=path)
+        text = " ".join(message.decode(errors="replace").split())
+        raise OutputError(f"is damaged, or is not a file of results: {text}", path=path)
     if status != 0:
         raise OutputError("is damaged: the process in which HDF5 reads it crashes", path=path)
 
@@ -76,5 +76,5 @@ def _read_by_another(content: bytes, seconds: float) -> tuple[int, bytes]:
     if not Path(sys.executable or "").name.startswith("python"):  # it may be an application with embedded Python
         raise OSError("this program is no interpreter of Python")
     command = [sys.executable, "-P", "-c", _PROGRAM, str(MEMORY), str(LONGEST)]
-    done = subprocess.run(command, input=content, capture_output=True, timeout=seconds, check=False)
-    return done.returncode, done.stdout
+    result = subprocess.run(command, input=content, capture_output=True, timeout=seconds, check=False)
+    return result.returncode, result.stdout

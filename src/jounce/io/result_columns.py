@@ -39,14 +39,14 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
     """
     from xarray import Variable
 
-    along = next(name for name in ALONG if name in dataset.dims)
-    first = (name for name in CURVE_AXES if name in dataset.coords) if along == "point" else (along,)
+    dimension = next(name for name in ALONG if name in dataset.dims)
+    first = (name for name in CURVE_AXES if name in dataset.coords) if dimension == "point" else (dimension,)
     columns_found = {name: np.asarray(dataset[name], float) for name in first}
     for name, variable in dataset.data_vars.items():
-        if variable.dims == (along,) and along == "angle":
+        if variable.dims == (dimension,) and dimension == "angle":
             columns_found[str(name)] = np.asarray(variable, float)
-        axes = tuple(dim for dim in variable.dims if dim not in (along, "derivative"))
-        if not {along, "derivative"} <= set(variable.dims) or (axes and axes not in AXES):
+        axes = tuple(dim for dim in variable.dims if dim not in (dimension, "derivative"))
+        if not {dimension, "derivative"} <= set(variable.dims) or (axes and axes not in AXES):
             continue
         parts: list[tuple[str, Any]] = [(str(name), variable)]
         if axes:
@@ -54,18 +54,18 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
                 "".join(map(str, columns_found))
                 for columns_found in itertools.product(*(variable[a].values for a in axes))
             ]
-            flat = variable.transpose(*axes, "derivative", along)
-            whole = flat.values.reshape(-1, *flat.shape[-2:])
-            dims = ("derivative", along)
-            parts = [(f"{name}_{label}", Variable(dims, part)) for label, part in zip(labels, whole, strict=True)]
+            flat = variable.transpose(*axes, "derivative", dimension)
+            matrix = flat.values.reshape(-1, *flat.shape[-2:])
+            dims = ("derivative", dimension)
+            parts = [(f"{name}_{label}", Variable(dims, part)) for label, part in zip(labels, matrix, strict=True)]
         for stem, part in parts:
-            values = part.transpose("derivative", along).values
+            values = part.transpose("derivative", dimension).values
             for order, row in zip(dataset["derivative"].values, values, strict=True):
                 column = f"{stem}_d{order}" if order else stem
                 if column in columns_found:
                     raise OutputError(f"two outputs make a column of the same name, '{column}'")
                 columns_found[column] = np.asarray(row, float)
-    if along == "time" and _derivative_count(list(columns_found)[1:]) > dataset.sizes.get("derivative", 1):
+    if dimension == "time" and _derivative_count(list(columns_found)[1:]) > dataset.sizes.get("derivative", 1):
         conflicting = next(name for name in columns_found if re.search("_d[0-9]+$", name))
         raise OutputError(
             f"the output '{conflicting}' reads as a derivative in a table; give it another name, or write .nc"

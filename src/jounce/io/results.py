@@ -218,24 +218,24 @@ def _write_rows(dataset: xarray.Dataset, stream: TextIO, header_units: bool | No
 
 def _netcdf(dataset: xarray.Dataset) -> Any:
     """Return the content of a NetCDF file of a dataset."""
-    named = dataset.assign_attrs({"Conventions": "CF-1.11", "history": f"written by jounce {_version()}"})
-    for name in (*named.data_vars, *named.coords):
+    result = dataset.assign_attrs({"Conventions": "CF-1.11", "history": f"written by jounce {_version()}"})
+    for name in (*result.data_vars, *result.coords):
         if "/" in str(name):
             raise OutputError(f"the name '{name}' cannot stand in a NetCDF file, it has a /")
-        named[name].encoding = {}
-    if "time" in named.coords:
-        usual = {"units": "s", "long_name": "time", "standard_name": "time", "axis": "T"}
-        named = named.assign_coords(time=named["time"].assign_attrs(usual | named["time"].attrs))
-    for holder in (named, *(named[name] for name in named.variables)):
+        result[name].encoding = {}
+    if "time" in result.coords:
+        time_attributes = {"units": "s", "long_name": "time", "standard_name": "time", "axis": "T"}
+        result = result.assign_coords(time=result["time"].assign_attrs(time_attributes | result["time"].attrs))
+    for holder in (result, *(result[name] for name in result.variables)):
         holder.attrs = {key: _attribute(value) for key, value in holder.attrs.items() if value is not None}
     # in memory: on a full disk, HDF5 does not close its file, prints to standard error, and may end the process
-    return named.to_netcdf(engine="h5netcdf", format="NETCDF4")
+    return result.to_netcdf(engine="h5netcdf", format="NETCDF4")
 
 
 def _attribute(value: Any) -> Any:
     """Return an attribute in a form that NetCDF can hold."""
-    plain = isinstance(value, (str, int, float, np.ndarray, np.number)) and not isinstance(value, bool)
-    return value if plain else str(value)
+    is_plain = isinstance(value, (str, int, float, np.ndarray, np.number)) and not isinstance(value, bool)
+    return value if is_plain else str(value)
 
 
 def _version() -> str:

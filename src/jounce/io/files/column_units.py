@@ -59,14 +59,14 @@ def in_units(dataset: xarray.Dataset, units: Mapping[str, str] | ShownUnits) -> 
     if not isinstance(units, ShownUnits):
         stored_units = {str(name): x.attrs["units"] for name, x in dataset.data_vars.items() if "units" in x.attrs}
         units = ShownUnits(units, stored_units)
-    shown = dataset.copy()
+    converted = dataset.copy()
     for name, variable in dataset.variables.items():
         if (unit := variable.attrs.get("units")) is None or name == "time":
             continue
         label, factor = units.of(unit, str(name))
         if label != unit:
-            shown[name] = (variable.dims, variable.values * factor, variable.attrs | {"units": label})
-    return shown
+            converted[name] = (variable.dims, variable.values * factor, variable.attrs | {"units": label})
+    return converted
 
 
 def is_si(unit: str | None) -> bool:

@@ -91,16 +91,16 @@ def _yaml(data: Mapping[str, Any]) -> str:
             node.fa.set_block_style()
         return node
 
-    whole = CommentedMap()
+    mapping = CommentedMap()
     for key, value in data.items():
-        whole[key] = styled(value, key not in BLOCKS)
+        mapping[key] = styled(value, key not in BLOCKS)
         if key in BLOCKS and isinstance(value, Mapping):
             for name, entry in value.items():
                 if isinstance(entry, Mapping) and len(str(entry)) + len(str(name)) > WIDTH:
-                    whole[key][name].fa.set_block_style()
+                    mapping[key][name].fa.set_block_style()
     writer, stream = YAML(), io.StringIO()
     writer.width, writer.allow_unicode = 100_000, False
-    writer.dump(whole, stream)
+    writer.dump(mapping, stream)
     return stream.getvalue()
 
 
@@ -113,19 +113,19 @@ def _toml(data: Mapping[str, Any]) -> str:
             inline.update({key: styled(entry) for key, entry in value.items()})
             return inline
         if isinstance(value, (list, tuple)):
-            listed = tomlkit.array()
-            listed.extend(map(styled, value))
-            return listed
+            array = tomlkit.array()
+            array.extend(map(styled, value))
+            return array
         return value
 
-    whole = tomlkit.document()
+    document = tomlkit.document()
     for key, value in data.items():
         if key not in BLOCKS or not isinstance(value, Mapping):
-            whole.append(key, styled(value))
+            document.append(key, styled(value))
     for key, value in data.items():  # TOML requires its tables last
         if key in BLOCKS and isinstance(value, Mapping):
             table = tomlkit.table()
             for name, entry in value.items():
                 table.append(name, styled(entry))
-            whole.append(key, table)
-    return tomlkit.dumps(whole)
+            document.append(key, table)
+    return tomlkit.dumps(document)

@@ -74,10 +74,10 @@ def copy_example(name: str, path: str | PathLike[str] | None = None, *, overwrit
     """
     folder = examples_folder()
     examples = {_name(file, folder): file for file in folder.rglob("*") if file.suffix in _KINDS}
-    short = name.removesuffix(".yaml").removesuffix(".py").replace("-", "_")
+    stem = name.removesuffix(".yaml").removesuffix(".py").replace("-", "_")
     if name not in examples:
-        check_name("example", short, examples, JounceError)
-    source = examples.get(name) or examples[short]
+        check_name("example", stem, examples, JounceError)
+    source = examples.get(name) or examples[stem]
     target = Path(source.name) if path is None else Path(path)
     pairs = [(source, target)]
     if source.suffix in (".yaml", ".py"):

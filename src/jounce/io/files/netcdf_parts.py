@@ -73,18 +73,18 @@ def _layout(example: Any, count: int) -> _Layout:
     import h5netcdf
 
     file, offsets = _SparseFile(), {}
-    with h5netcdf.File(io.BytesIO(example), "r") as small, h5netcdf.File(file, "w") as large:
-        ordered = sorted(small.dimensions.items(), key=lambda named: named[1]._dimid)
-        large.dimensions = {name: count if name == "time" else each.size for name, each in ordered}
-        large.attrs.update(small.attrs)
-        for name, given in small.variables.items():
-            along = "time" in given.dimensions
+    with h5netcdf.File(io.BytesIO(example), "r") as sample, h5netcdf.File(file, "w") as target:
+        ordered = sorted(sample.dimensions.items(), key=lambda named: named[1]._dimid)
+        target.dimensions = {name: count if name == "time" else dimension.size for name, dimension in ordered}
+        target.attrs.update(sample.attrs)
+        for name, given in sample.variables.items():
+            has_time = "time" in given.dimensions
             attributes = dict(given.attrs)
             missing = attributes.pop("_FillValue", None)
-            settings = {"dcpl": _preallocated_properties()} if along else {}
-            variable = large.create_variable(name, given.dimensions, given.dtype, fillvalue=missing, **settings)
+            settings = {"dcpl": _preallocated_properties()} if has_time else {}
+            variable = target.create_variable(name, given.dimensions, given.dtype, fillvalue=missing, **settings)
             variable.attrs.update(attributes)
-            if not along:
+            if not has_time:
                 variable[...] = given[...]
                 continue
             offset = variable._h5ds.id.get_offset()
@@ -116,9 +116,9 @@ def _reserve(stream: io.FileIO, size: int) -> None:
 
 def _write_at(stream: io.FileIO, offset: int, values: Any) -> None:
     stream.seek(offset)
-    left = memoryview(values)
-    while left.nbytes:
-        left = left[stream.write(left) :]
+    remaining = memoryview(values)
+    while remaining.nbytes:
+        remaining = remaining[stream.write(remaining) :]
 
 
 class _SparseFile(io.RawIOBase):
@@ -170,7 +170,7 @@ class _SparseFile(io.RawIOBase):
         """Yield the blocks of a span of bytes from the position: start in the span, number, bytes of the block."""
         start = 0
         while start < length:
-            number, within = divmod(self._position + start, BLOCK)
-            part = range(within, min(BLOCK, within + length - start))
+            number, offset = divmod(self._position + start, BLOCK)
+            part = range(offset, min(BLOCK, offset + length - start))
             yield start, number, part
             start += len(part)

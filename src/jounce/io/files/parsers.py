@@ -133,11 +133,11 @@ def _yaml_error(path: str, error: Exception, lines: list[str]) -> MechanismFileE
         and mark.column > start.column
     ):
         before = [len(x) - len(x.lstrip()) for x in lines[: mark.line] if x.strip() and x.strip()[0] != "#"]
-        words, usual = "further than the entries beside it", start.column
+        phrase, column = "further than the entries beside it", start.column
         if before and mark.column < before[-1]:
-            words, usual = "less than those before it", before[-1]
+            phrase, column = "less than those before it", before[-1]
         text = (
-            f"the line is indented {words} ({mark.column} space{'s' * (mark.column != 1)}, not {usual}); entries of "
+            f"the line is indented {phrase} ({mark.column} space{'s' * (mark.column != 1)}, not {column}); entries of "
             "one mapping begin in one column"
         )
     elif "mapping values are not allowed" in text:
@@ -295,8 +295,8 @@ class _TomlLines:
             elif token == "[" and not self.parts and not self.open:
                 header = 1
             elif token == "=":
-                around = self.open[-1] if self.open else self.table
-                self.location, self.parts = self._note((*around, *self.parts), line), None
+                outer = self.open[-1] if self.open else self.table
+                self.location, self.parts = self._note((*outer, *self.parts), line), None
             elif token == "}":
                 self._close()
             elif token != ".":
@@ -327,9 +327,9 @@ class _TomlLines:
             self._close()
             return
         if token == ",":
-            around, last = self.open[-1], self.location[-1]
-            if len(self.location) > len(around) and isinstance(last, int):  # in an array
-                self.location = (*around, last + 1)
+            outer, last = self.open[-1], self.location[-1]
+            if len(self.location) > len(outer) and isinstance(last, int):  # in an array
+                self.location = (*outer, last + 1)
             else:
                 self.parts = []
             return

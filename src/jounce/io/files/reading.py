@@ -174,10 +174,10 @@ def named_file(
     try:
         resolved = os.path.realpath((folder_of_holder if folder is None else Path(folder)) / name)
         bases = [folder_of_holder, Path(os.path.realpath(holder)).parent, *allow]
-        below = any(Path(resolved).is_relative_to(os.path.realpath(base)) for base in bases)
+        is_inside = any(Path(resolved).is_relative_to(os.path.realpath(base)) for base in bases)
     except (OSError, ValueError) as reason:
         raise error(f"cannot be the name of a file: {reason_of(reason)}", value=name) from None
-    if not below:
+    if not is_inside:
         advice = "put it there, or allow its folder with --allow DIR (in Python allow=[DIR])"
         raise error(f"lies outside the folder of the file that names it; {advice}", value=name)
     return resolved
@@ -290,5 +290,5 @@ def is_input(path: str | PathLike[str]) -> bool:
         return False
     if real in _inputs:
         return True
-    same = [name for name, identity in _inputs.items() if identity == (status.st_dev, status.st_ino)]
-    return any(Path(name).exists() and Path(name).samefile(real) for name in same)
+    names = [name for name, identity in _inputs.items() if identity == (status.st_dev, status.st_ino)]
+    return any(Path(name).exists() and Path(name).samefile(real) for name in names)

@@ -210,8 +210,8 @@ def read_points(
         return None, np.stack([table.column(k) for k in range(len(table.header))], axis=1)
     targets = {}
     for letter in "xyz":
-        named = [k for k, name in enumerate(table.header) if name == letter or name.endswith(f"_{letter}")]
-        exact = [k for k in named if table.header[k] == letter] or named
+        columns = [k for k, name in enumerate(table.header) if name == letter or name.endswith(f"_{letter}")]
+        exact = [k for k in columns if table.header[k] == letter] or columns
         if len(exact) > 1:
             message = f"several columns may be the {letter} of the points; name one of them '{letter}'"
             raise table.error(message, line=table.header_line)
@@ -325,8 +325,8 @@ class Table:
         except UnitError as error:
             raise self.error(error.message, **location) from None
         if allowed and dimension not in allowed:
-            words = " or ".join(map(describe_dimension, allowed))
-            raise self.error(f"the unit measures {describe_dimension(dimension)}, not {words}", **location)
+            units = " or ".join(map(describe_dimension, allowed))
+            raise self.error(f"the unit measures {describe_dimension(dimension)}, not {units}", **location)
         return size, dimension
 
     def column(self, number: int, allowed: Sequence[Dimension] = ()) -> list[float]:
@@ -334,11 +334,11 @@ class Table:
         size, _ = self.unit(number, allowed)
         if self.numbers is not None:
             column = self.numbers.values[:, number] + float(self.numbers.offsets.get(number, 0))
-            bad = np.flatnonzero(~(np.abs(column) <= LARGEST_NUMBER))
-            if len(bad):
-                value = float(column[bad[0]])
+            invalid = np.flatnonzero(~(np.abs(column) <= LARGEST_NUMBER))
+            if len(invalid):
+                value = float(column[invalid[0]])
                 raise self.error(
-                    fault_of_number(value), line=self.line(int(bad[0])), name=self.header[number], value=value
+                    fault_of_number(value), line=self.line(int(invalid[0])), name=self.header[number], value=value
                 )
             return (column * size).tolist()
         values = []
@@ -356,8 +356,8 @@ def _without_comments(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list
     """Return rows without the leading comments; the last comment is kept if it names the columns."""
     first = next((k for k, (_, row) in enumerate(rows) if not row[0].startswith(COMMENT[0])), len(rows))
     numbers = rows[first][1] if first < len(rows) else []
-    named = first > 0 and len(rows[first - 1][1]) == len(numbers) and all(_number(x) is not None for x in numbers)
-    return rows[first - named :]
+    has_header = first > 0 and len(rows[first - 1][1]) == len(numbers) and all(_number(x) is not None for x in numbers)
+    return rows[first - has_header :]
 
 
 def _without_empty_end(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:

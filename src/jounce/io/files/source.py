@@ -84,8 +84,8 @@ def read_source(
     reader = {".toml": parsers.read_toml, ".json": parsers.read_json}.get(suffix, parsers.read_yaml)
     try:
         text = _decode(name, read_file(name))
-        several = many and reader is parsers.read_yaml and len(_DOCUMENT.findall(text)) > 0
-        source = _documents(name, text) if several else reader(name, text)
+        has_many = many and reader is parsers.read_yaml and len(_DOCUMENT.findall(text)) > 0
+        source = _documents(name, text) if has_many else reader(name, text)
         source.allow, source.error_type = check_allowed(allow), error_type
     except MechanismFileError as error:
         raise error_type(error.message, path=error.path, line=error.line, name=error.name, value=error.value) from None
@@ -96,9 +96,9 @@ def read_source(
 
 def _documents(path: str, text: str) -> Source:
     """Return the source of several documents; without the last one, if it ends early and another is before it."""
-    last = [match.start() for match in _DOCUMENT.finditer(text)][-1]
-    head, tail = text[:last], text[last:].partition("\n")[2]
-    line = text.count("\n", 0, last) + 2
+    position = [match.start() for match in _DOCUMENT.finditer(text)][-1]
+    head, tail = text[:position], text[position:].partition("\n")[2]
+    line = text.count("\n", 0, position) + 2
     try:
         source = _without_empty(parsers.read_yaml(path, text, many=True))
     except MechanismFileError as error:
@@ -114,14 +114,14 @@ def _documents(path: str, text: str) -> Source:
 
 def _without_empty(source: Source) -> Source:
     """Return the source of several documents without empty ones; a single document becomes the data itself."""
-    full = [k for k, document in enumerate(source.data) if document is not None]
-    if len(full) == 1:
-        lines = {location[1:]: line for location, line in source.lines.items() if location[:1] == (full[0],)}
-        return Source(source.path, source.data[full[0]], lines)
-    columns = {old: new for new, old in enumerate(full)}
+    nonempty = [k for k, document in enumerate(source.data) if document is not None]
+    if len(nonempty) == 1:
+        lines = {location[1:]: line for location, line in source.lines.items() if location[:1] == (nonempty[0],)}
+        return Source(source.path, source.data[nonempty[0]], lines)
+    columns = {old: new for new, old in enumerate(nonempty)}
     lines = {
         (columns[location[0]], *location[1:]): line
         for location, line in source.lines.items()
         if location and location[0] in columns
     }
-    return Source(source.path, [source.data[k] for k in full], lines, several=True)
+    return Source(source.path, [source.data[k] for k in nonempty], lines, several=True)

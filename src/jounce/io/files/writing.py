@@ -157,18 +157,18 @@ def _removed(scratch: Path) -> Iterator[None]:
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
 
-    watched = []
+    signals = []
     if threading.current_thread() is threading.main_thread():  # other threads cannot set handlers
         ends = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
-        watched = [number for number in ends if number is not None and signal.getsignal(number) is signal.SIG_DFL]
+        signals = [number for number in ends if number is not None and signal.getsignal(number) is signal.SIG_DFL]
     try:
         _scratches.add(scratch)
-        for number in watched:
+        for number in signals:
             signal.signal(number, stop)
         yield
     finally:
         with suppress(OSError):
             scratch.unlink()
         _scratches.discard(scratch)
-        for number in watched:
+        for number in signals:
             signal.signal(number, signal.SIG_DFL)

@@ -102,9 +102,9 @@ class _CamFile:
         for name in assigned:
             check_name("parameter", name, parameters, MechanismFileError, name="--set")
         for name, raw in parameters.items():
-            at = ("parameters", name)
-            check_parameter_name(name, source.error_type, **source.error_fields(at))
-            value = source.value(at, assigned.get(name, raw), "any", self.parameters, self.dimensions)
+            location = ("parameters", name)
+            check_parameter_name(name, source.error_type, **source.error_fields(location))
+            value = source.value(location, assigned.get(name, raw), "any", self.parameters, self.dimensions)
             if value.dimension is not None:
                 self.dimensions[name] = value.dimension
             number = value.value
@@ -129,8 +129,8 @@ class _CamFile:
         try:
             profile = plate_cam(law, follower, base, sense=sense, count=points, title=str(title))
         except JounceError as error:
-            at = {"law": ("law",), "count": ("cam", "count"), "base_radius": ("cam", "base_radius")}
-            location = at.get(str(error.name), ("follower", str(error.name)))
+            place = {"law": ("law",), "count": ("cam", "count"), "base_radius": ("cam", "base_radius")}
+            location = place.get(str(error.name), ("follower", str(error.name)))
             raise self.source.error(error.message, location, value=error.value) from None
         try:
             profile = dataclasses.replace(profile, units=self.data.get("units") or {})
@@ -145,17 +145,17 @@ class _CamFile:
         """Warn of a lift, or of a length without a unit, that resembles the others only in millimeters."""
         fields = {("follower", field.name): getattr(follower, field.name) for field in dataclasses.fields(follower)}
         lengths: dict[tuple[str, ...], float] = {("cam", "base_radius"): base}
-        lengths |= {at: abs(x) for at, x in fields.items() if isinstance(x, int | float) and x}
+        lengths |= {location: abs(x) for location, x in fields.items() if isinstance(x, int | float) and x}
         if not follower.turning and (values := values_of(law, 0.0, 2 * math.pi)) is not None and values.any():
             lengths["law",] = float(abs(values).max())
-        for at, length in lengths.items():
-            other_lengths = [x for place, x in lengths.items() if place != at]
-            if not other_lengths or (at != ("law",) and not self._is_plain(self.source.at(at))):
+        for location, length in lengths.items():
+            other_lengths = [x for place, x in lengths.items() if place != location]
+            if not other_lengths or (location != ("law",) and not self._is_plain(self.source.at(location))):
                 continue
-            if is_thousandfold(length, usual := statistics.median(other_lengths), FAR_OFF):
-                times, prefix = float(f"{length / usual:.1g}"), "goes to " if at == ("law",) else ""
-                words = f"{prefix}{length:.4g} m, {times:g} times the other lengths: {length:.4g} mm? {IN_SI}"
-                fault = self.source.error(words, at)
+            if is_thousandfold(length, typical := statistics.median(other_lengths), FAR_OFF):
+                times, prefix = float(f"{length / typical:.1g}"), "goes to " if location == ("law",) else ""
+                phrase = f"{prefix}{length:.4g} m, {times:g} times the other lengths: {length:.4g} mm? {IN_SI}"
+                fault = self.source.error(phrase, location)
                 warn_caller(UnitWarning(str(fault)))
 
     def _is_plain(self, raw: Any) -> bool:
@@ -164,10 +164,10 @@ class _CamFile:
             (self.data.get("parameters") or {}).get(raw, raw) if isinstance(raw, str) else raw, int | float
         )
 
-    def _length(self, at: tuple[str, ...], data: dict[str, Any]) -> float:
-        if at[-1] not in data:
-            raise self.source.error("is missing", at)
-        value = self.source.value(at, data[at[-1]], "length", self.parameters, self.dimensions).value
+    def _length(self, location: tuple[str, ...], data: dict[str, Any]) -> float:
+        if location[-1] not in data:
+            raise self.source.error("is missing", location)
+        value = self.source.value(location, data[location[-1]], "length", self.parameters, self.dimensions).value
         return float(value.evaluate(self.parameters) if isinstance(value, Expression) else value)
 
     def _follower(self) -> TranslatingFollower | OscillatingFollower:

@@ -153,8 +153,8 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
     links = _file_names(name for name in robot.links if name != robot.base)
     links[robot.base] = robot.base
     file_names = _file_names([*robot.joints, *robot.closures])
-    changed = {old: new for names in (links, file_names) for old, new in names.items() if old != new}
-    if not changed:
+    new_names = {old: new for names in (links, file_names) for old, new in names.items() if old != new}
+    if not new_names:
         return robot, {}
 
     def joint(given: Any) -> Any:
@@ -174,7 +174,7 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
         robot.strict,
         [_with_joints(given, file_names) for given in robot.couplings.values()],
     )
-    return renamed, changed
+    return renamed, new_names
 
 
 def _with_joints(coupling: Any, names: Mapping[str, str]) -> Any:

@@ -59,22 +59,22 @@ def load_drive_limits(path: str | PathLike[str], mechanism: Mechanism) -> dict[s
     limits: dict[str, Limits] = {}
     for kind, elements_of_kind in (("drivers", mechanism.drivers), ("outputs", mechanism.outputs)):
         for name in source.mapping((kind,)) if kind in data else ():
-            at: Location = (kind, name)
+            location: Location = (kind, name)
             if name not in elements_of_kind:
-                raise source.error(no_such(kind[:-1], name, list(elements_of_kind)), at)
+                raise source.error(no_such(kind[:-1], name, list(elements_of_kind)), location)
             if name in limits:
-                raise source.error("a driver and an output of one name cannot both have limits; rename one", at)
+                raise source.error("a driver and an output of one name cannot both have limits; rename one", location)
             keys = (*RATES, *EFFORTS) if kind == "drivers" else tuple(RATES)
             values: dict[str, float] = {}
-            for key, raw in source.mapping(at, keys, others=OTHER_WORDS if kind == "drivers" else None).items():
-                value = source.value((*at, key), raw)
+            for key, raw in source.mapping(location, keys, others=OTHER_WORDS if kind == "drivers" else None).items():
+                value = source.value((*location, key), raw)
                 turns = _turns(mechanism, kind, name)
                 dimension = _dimension(key, turns)
                 if value.dimension and value.dimension != dimension:
                     message = f"must be {describe_dimension(dimension)}, not {describe_dimension(value.dimension)}"
-                    raise source.error(message, (*at, key), value=raw)
+                    raise source.error(message, (*location, key), value=raw)
                 if not isinstance(value.value, float) or not math.isfinite(value.value) or value.value <= 0:
-                    raise source.error("must be a finite number greater than zero", (*at, key), value=raw)
+                    raise source.error("must be a finite number greater than zero", (*location, key), value=raw)
                 values[key] = value.value
             limits[name] = dataclasses.replace(Limits(), **values)
     if not limits:

@@ -99,12 +99,12 @@ def with_leaders(source: Source, space: str, elements: dict[str, dict[str, Any]]
     joints = {}
     for name, entry in elements["joints"].items():
         if isinstance(entry, CamEntry):
-            at = ("joints", name, "motion", "of")
+            location = ("joints", name, "motion", "of")
             if entry.of == name and name not in elements["drivers"]:
-                raise source.error("a cam cannot follow itself", at, value=name)
+                raise source.error("a cam cannot follow itself", location, value=name)
             try:
                 entry = Cam(entry.follower, coordinate_of_element(leader(entry.of)), entry.of)
             except JounceError as error:
-                raise source.error(error.message, at, value=entry.of) from None
+                raise source.error(error.message, location, value=entry.of) from None
         joints[name] = entry
     return {**elements, "joints": joints}

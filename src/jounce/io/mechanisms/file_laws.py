@@ -33,7 +33,7 @@ class FileLaws:
     def __init__(self, source: Source, drivers: Mapping[str, Any]):
         self.source, self.drivers = source, drivers
 
-    def law(self, location: Location, value: Any, following: tuple[str, ...] = ()) -> Any:
+    def law(self, location: Location, value: Any, chain: tuple[str, ...] = ()) -> Any:
         """Return a value with samples and followed drivers resolved to laws, also within a list of laws.
 
         Parameters
@@ -42,11 +42,11 @@ class FileLaws:
             Location of the value in the file.
         value : object
             Value as the schema gives it.
-        following : tuple of str, optional
+        chain : tuple of str, optional
             Drivers that depend on the law.
         """
         if isinstance(value, tuple):
-            return tuple(self.law((*location, index), entry, following) for index, entry in enumerate(value))
+            return tuple(self.law((*location, index), entry, chain) for index, entry in enumerate(value))
         if isinstance(value, AbstractMotion):
             return value
         if hasattr(value, "file"):
@@ -54,17 +54,17 @@ class FileLaws:
         if isinstance(value, CurveOfCam):
             return self._curve_of_cam(location, value)
         if hasattr(value, "held"):
-            fixed = self.law((*location, "law"), value.held, following)
+            fixed = self.law((*location, "law"), value.held, chain)
             return OutputMotion(value.output, fixed if isinstance(fixed, AbstractMotion | Expression) else repr(fixed))
         if hasattr(value, "samples"):
-            law, by = self._spline(location, value), value.of
+            law, leader = self._spline(location, value), value.of
         elif hasattr(value, "driver"):
-            law, by = value.law, value.driver
+            law, leader = value.law, value.driver
         else:
             return value
-        if by is None:
+        if leader is None:
             return law
-        return FollowingMotion(law, self._leader(location, by, following) if isinstance(by, str) else by)
+        return FollowingMotion(law, self._leader(location, leader, chain) if isinstance(leader, str) else leader)
 
     def _curve(self, location: Location, given: Any) -> SampledCurve:
         from jounce.io.files.samples import read_points
@@ -95,11 +95,11 @@ class FileLaws:
             return self._spline(location, value), value.of
         return value.law, value.driver
 
-    def _leader(self, location: Location, name: str, following: tuple[str, ...]) -> AbstractMotion | Expression:
+    def _leader(self, location: Location, name: str, chain: tuple[str, ...]) -> AbstractMotion | Expression:
         """Return the law of a driver by its name."""
-        own = (str(location[1]),) if location[0] == "drivers" and not following else following
-        circle = (*own, name)
-        if name in own:
+        names = (str(location[1]),) if location[0] == "drivers" and not chain else chain
+        circle = (*names, name)
+        if name in names:
             message = f"drivers follow each other in a circle: {' -> '.join(circle)}"
             raise self.source.error(message, (*location, "of"), value=name)
         given = self.law(("drivers", name, "motion"), self.drivers[name]["motion"], circle)

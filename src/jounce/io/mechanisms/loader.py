@@ -149,11 +149,11 @@ def _plain(model: Any) -> dict[str, Any]:
 
 def _build(source: Source, space: str, model: dict[str, Any], locations: _Locations) -> Mechanism:
     parameters = model["parameters"]
-    bare = Mechanism(
+    skeleton = Mechanism(
         space=space, bodies={"any": Body([0.0] * POSITION_COMPONENTS[space])}, joints={}, parameters=parameters
     )
     try:
-        values = bare.parameter_values
+        values = skeleton.parameter_values
     except JounceError as error:
         raise error.located(name="parameters") from None
     laws = FileLaws(source, {name: _plain(driver) for name, driver in model["drivers"].items()})
@@ -220,14 +220,14 @@ def _elements(
             kind = catalogue(space, "driver" if cam else ROLES[section])[given["type"]]
         locations[name_in_file] = ((section, name), file_keys(kind))
         arguments = _arguments(locations[name_in_file][1], given)
-        of = ""
+        leader = ""
         if cam:
-            arguments["motion"], of = laws.of_cam((section, name, "motion"), arguments["motion"])
+            arguments["motion"], leader = laws.of_cam((section, name, "motion"), arguments["motion"])
         arguments = {field: laws.law((section, name, field), x) for field, x in arguments.items()}
         if kind.body_count:
             arguments["bodies"] = given["bodies"] if kind.body_count > 1 else (given["body"],)
         try:
-            elements[name] = CamEntry(kind(**arguments), of) if cam else kind(**arguments)
+            elements[name] = CamEntry(kind(**arguments), leader) if cam else kind(**arguments)
         except JounceError as error:  # a constructor names its field only
             error.name = f"{name_in_file}.{error.name}" if error.name else name_in_file
             raise

@@ -69,12 +69,12 @@ def override(mechanism: Mechanism, texts: Iterable[str]) -> Mechanism:
     for name in values:
         check_name("parameter", name, mechanism.parameters, MechanismError, name="--set")
     try:
-        changed = mechanism.with_parameters(**values) if values else mechanism
+        result = mechanism.with_parameters(**values) if values else mechanism
     except JounceError as error:
         name = (error.name or "").removeprefix("parameters.")
         raise type(error)(error.message, name=f"--set {name}", value=error.value) from None
-    changed.parameter_values  # noqa: B018 - evaluated to report circular expressions now
+    result.parameter_values  # noqa: B018 - evaluated to report circular expressions now
     plain = [name for name, text in values.items() if is_plain(text)]
     if plain:
-        warn_of_values(mechanism, changed, plain, "--set")
-    return changed
+        warn_of_values(mechanism, result, plain, "--set")
+    return result

@@ -63,10 +63,10 @@ def write_revised(
         raise OutputError(message, path=fspath(path), value=suffix)
     values = {name: float(mechanism.parameter_values[name]) for name in names}
     data = read_source(original).data
-    written = {name: with_value(data["parameters"][name], value) for name, value in values.items()}
+    texts = {name: with_value(data["parameters"][name], value) for name, value in values.items()}
     assembly = mechanism.assembly if mechanism.assembly != data.get("assembly") else None
     text = Path(original).read_bytes().decode("utf-8-sig")
-    revised = (_toml if suffix == ".toml" else _with_replaced_scalars)(text, written, assembly)
+    revised = (_toml if suffix == ".toml" else _with_replaced_scalars)(text, texts, assembly)
     with replacing(path, overwrite=overwrite) as scratch:
         with scratch.open("w", encoding="utf-8", newline="") as stream:
             stream.write(revised)
@@ -76,10 +76,12 @@ def write_revised(
             error.path = fspath(path)
             raise
         read = read_back.parameter_values
-        wrong = [name for name, value in values.items() if abs(read[name] - value) > ROUNDING * abs(value)]
-        if wrong or read_back.assembly != mechanism.assembly:
+        errors = [name for name, value in values.items() if abs(read[name] - value) > ROUNDING * abs(value)]
+        if errors or read_back.assembly != mechanism.assembly:
             message = "what would be written does not read back as the same design"
-            raise MechanismFileError(message, path=fspath(path), name=f"parameters.{wrong[0]}" if wrong else "assembly")
+            raise MechanismFileError(
+                message, path=fspath(path), name=f"parameters.{errors[0]}" if errors else "assembly"
+            )
 
 
 def with_value(old: Any, value: float) -> Any:
@@ -133,10 +135,10 @@ def _digits(value: float, size: Any) -> Iterator[str]:
         for count in range(1, 19):
             yield _shortest(f"{exact:.{count}g}")
         return
-    near = value / float(size)
-    for each in (near, math.nextafter(near, math.inf), math.nextafter(near, -math.inf)):
+    quotient = value / float(size)
+    for candidate in (quotient, math.nextafter(quotient, math.inf), math.nextafter(quotient, -math.inf)):
         for count in (12, 15, 16, 17):
-            yield _shortest(f"{each:.{count}g}")
+            yield _shortest(f"{candidate:.{count}g}")
 
 
 def _shortest(text: str) -> str:

@@ -106,8 +106,8 @@ class _ClosureFile:
             raise self.source.error("the file has neither closures nor joints", value=list(data))
         robot = self.given
         if "joints" in data:
-            changed = {name: self._joint(name) for name in self.source.mapping(("joints",))}
-            robot = robot.changed(joints=[changed.get(name, joint) for name, joint in robot.joints.items()])
+            joints = {name: self._joint(name) for name in self.source.mapping(("joints",))}
+            robot = robot.changed(joints=[joints.get(name, joint) for name, joint in robot.joints.items()])
         if "closures" not in data:
             return robot
         closures = []
@@ -119,93 +119,98 @@ class _ClosureFile:
             robot = robot.with_closures(closures)
             _check_closed(robot)
         except RobotError as error:
-            at = tuple((error.name or "closures").split(".")[:2])
-            raise self.source.error(error.message, at if self.source.at(at) is not None else ("closures",)) from None
+            location = tuple((error.name or "closures").split(".")[:2])
+            raise self.source.error(
+                error.message, location if self.source.at(location) is not None else ("closures",)
+            ) from None
         return robot
 
     def _joint(self, name: str) -> Joint:
-        at = ("joints", name)
+        place = ("joints", name)
         joint = self.given.joints.get(name)
         moving = [x.name for x in self.given.moving_joints]
         if joint is None or not joint.moving:
-            raise self.source.error(no_such("moving joint", name, moving), at)
-        entry = self.source.mapping(at, OF_JOINT)
+            raise self.source.error(no_such("moving joint", name, moving), place)
+        entry = self.source.mapping(place, OF_JOINT)
         changes: dict[str, Any] = {}
         for key in ("stiffness", "damping"):
             if key in entry:
-                changes[key] = self._number((*at, key), entry[key], _dimensions(key, joint.turning))
+                changes[key] = self._number((*place, key), entry[key], _dimensions(key, joint.turning))
         if "reference" in entry:
             kind = (ANGLE,) if joint.turning else (LENGTH,)
-            changes["spring_reference"] = self._number((*at, "reference"), entry["reference"], kind)
+            changes["spring_reference"] = self._number((*place, "reference"), entry["reference"], kind)
         if "friction" in entry:
-            raw, location = entry["friction"], (*at, "friction")
+            raw, location = entry["friction"], (*place, "friction")
             parts = raw if isinstance(raw, list) else [raw]
             numbers = [self._number(location, part, _dimensions("friction", joint.turning)) for part in parts]
             if len(numbers) not in (1, 2):
                 raise self.source.error("must be one value, or two: forward and backward", location, value=raw)
             changes["friction"] = numbers if len(numbers) > 1 else numbers[0]
         if "gear_ratio" in entry and "rotor_inertia" not in entry:
-            raise self.source.error("is of no use without rotor_inertia", (*at, "gear_ratio"))
+            raise self.source.error("is of no use without rotor_inertia", (*place, "gear_ratio"))
         if "rotor_inertia" in entry:
             kinds = _dimensions("rotor_inertia", joint.turning)
-            inertia = self._number((*at, "rotor_inertia"), entry["rotor_inertia"], kinds)
-            ratio = self._number((*at, "gear_ratio"), entry.get("gear_ratio", 1.0), ())
+            inertia = self._number((*place, "rotor_inertia"), entry["rotor_inertia"], kinds)
+            ratio = self._number((*place, "gear_ratio"), entry.get("gear_ratio", 1.0), ())
             if joint.turning and (hint := rotor_doubt(inertia, ratio, entry)):
-                warn_caller(UnitWarning(str(self.source.error(hint, (*at, "rotor_inertia")))))
+                warn_caller(UnitWarning(str(self.source.error(hint, (*place, "rotor_inertia")))))
             changes["armature"] = inertia * ratio**2
         try:
             return dataclasses.replace(joint, **changes)
         except RobotError as error:
             key = {"spring_reference": "reference", "armature": "rotor_inertia"}
             last = (error.name or "").rpartition(".")[2]
-            raise self.source.error(error.message, (*at, key.get(last, last)), value=error.value) from None
+            raise self.source.error(error.message, (*place, key.get(last, last)), value=error.value) from None
 
     def _closure(self, name: str) -> Closure:
-        at = ("closures", name)
-        entry = self.source.mapping(at, OF_CLOSURE)
+        location = ("closures", name)
+        entry = self.source.mapping(location, OF_CLOSURE)
         kind = entry.get("type")
         if kind not in TYPES:
-            raise self.source.error(no_such("closure", kind, TYPES, "type"), (*at, "type"), value=kind)
+            raise self.source.error(no_such("closure", kind, TYPES, "type"), (*location, "type"), value=kind)
         frames = entry.get("frames")
         if not isinstance(frames, list) or len(frames) != 2:
             raise self.source.error(
-                "must be two frames, each a link or {link, xyz, rpy}", (*at, "frames"), value=frames
+                "must be two frames, each a link or {link, xyz, rpy}", (*location, "frames"), value=frames
             )
-        placed = [self._frame((*at, "frames"), frame) for frame in frames]
+        located = [self._frame((*location, "frames"), frame) for frame in frames]
         axis = None
         if "axis" in entry:
             if TYPES[kind] not in ("pin", "slider"):
-                raise self.source.error(f"a closure of type {kind} has no axis", (*at, "axis"), value=entry["axis"])
-            axis = self._vector((*at, "axis"), entry["axis"], ())
+                raise self.source.error(
+                    f"a closure of type {kind} has no axis", (*location, "axis"), value=entry["axis"]
+                )
+            axis = self._vector((*location, "axis"), entry["axis"], ())
         try:
-            return loop_closure(name, kind, placed, axis)
+            return loop_closure(name, kind, located, axis)
         except RobotError as error:
-            raise self.source.error(error.message, at, value=error.value) from None
+            raise self.source.error(error.message, location, value=error.value) from None
 
-    def _frame(self, at: Location, frame: Any) -> tuple[str, list[float], list[float]]:
+    def _frame(self, location: Location, frame: Any) -> tuple[str, list[float], list[float]]:
         given: Mapping[str, Any] = {"link": frame} if isinstance(frame, str) else frame
         if not isinstance(given, Mapping) or not set(given) <= set(OF_FRAME) or "link" not in given:
-            raise self.source.error("a frame is a link or {link, xyz, rpy}", at, value=frame)
+            raise self.source.error("a frame is a link or {link, xyz, rpy}", location, value=frame)
         if given["link"] not in self.given.links:
-            raise self.source.error(no_such("link", given["link"], self.given.links), at, value=given["link"])
+            raise self.source.error(no_such("link", given["link"], self.given.links), location, value=given["link"])
         xyz, rpy = (
-            self._vector(at, given.get(key, [0.0] * 3), kinds) for key, kinds in (("xyz", (LENGTH,)), ("rpy", (ANGLE,)))
+            self._vector(location, given.get(key, [0.0] * 3), kinds)
+            for key, kinds in (("xyz", (LENGTH,)), ("rpy", (ANGLE,)))
         )
         return given["link"], xyz, rpy
 
-    def _vector(self, at: Location, raw: Any, kinds: tuple[Dimension, ...]) -> list[float]:
+    def _vector(self, location: Location, raw: Any, kinds: tuple[Dimension, ...]) -> list[float]:
         if not isinstance(raw, list) or len(raw) != 3:
-            raise self.source.error("must be three numbers", at, value=raw)
-        return [self._number(at, part, kinds) for part in raw]
+            raise self.source.error("must be three numbers", location, value=raw)
+        return [self._number(location, part, kinds) for part in raw]
 
-    def _number(self, at: Location, raw: Any, kinds: tuple[Dimension, ...]) -> float:
-        parsed = self.source.value(at, raw)
+    def _number(self, location: Location, raw: Any, kinds: tuple[Dimension, ...]) -> float:
+        parsed = self.source.value(location, raw)
         if parsed.dimension and parsed.dimension not in kinds:
-            of = " or ".join(describe_dimension(kind) for kind in kinds) or "a number without unit"
-            message = f"the unit is that of {describe_dimension(parsed.dimension)}; needed is {of}"
-            raise self.source.error(message, at, value=raw)
+            expected = " or ".join(describe_dimension(kind) for kind in kinds) or "a number without unit"
+            message = f"the unit is that of {describe_dimension(parsed.dimension)}; needed is {expected}"
+            raise self.source.error(message, location, value=raw)
         if not isinstance(parsed.value, float) or not math.isfinite(parsed.value):
-            raise self.source.error("must be a finite number", at, value=raw)
+            raise self.source.error("must be a finite number", location, value=raw)
         return parsed.value
 
 

@@ -95,8 +95,8 @@ class _DrivesFile:
             raise self.source.error(message, (other,))
         if self.key not in data and "default" not in data:
             raise self.source.error(f"a file of drives has the key '{self.key}', 'default', or both", value=list(data))
-        own = self.source.mapping((self.key,)) if self.key in data else {}
-        for name in own:
+        entries = self.source.mapping((self.key,)) if self.key in data else {}
+        for name in entries:
             if name not in self.turning:
                 raise self.source.error(self._why_not(name), (self.key, name))
         default = self.source.mapping(("default",), KEYS) if "default" in data else {}
@@ -105,9 +105,9 @@ class _DrivesFile:
             self._drive(default, dict.fromkeys(default, ("default",)), True)  # raises the error about the unit
         drives = {}
         for name, kind in self.turning.items():
-            if name in own and own[name] is None:
+            if name in entries and entries[name] is None:
                 continue
-            entry = self.source.mapping((self.key, name), KEYS) if name in own else {}
+            entry = self.source.mapping((self.key, name), KEYS) if name in entries else {}
             defaults = default if fitting[kind] else {}
             locations = dict.fromkeys(defaults, ("default",)) | dict.fromkeys(entry, (self.key, name))
             values = {key: raw for key, raw in {**defaults, **entry}.items() if raw is not None}
@@ -146,29 +146,29 @@ class _DrivesFile:
             key = str(error.name)
             raise self.source.error(error.message, (*locations[key], key), value=values[key]) from None
 
-    def _number(self, raw: Any, key: str, at: Location, turning: bool, motor: bool) -> float:
-        number, dimension = self._parsed(raw, at)
+    def _number(self, raw: Any, key: str, location: Location, turning: bool, motor: bool) -> float:
+        number, dimension = self._parsed(raw, location)
         kind = motor if key in OF_MOTOR else turning
         if dimension and dimension not in _dimensions(key, kind):
             of = "motor" if key in OF_MOTOR else self.noun
             message = (
                 f"the unit is that of {describe_dimension(dimension)}; a {of} that {'turns' if kind else 'slides'} has"
             )
-            raise self.source.error(f"{message} {key} in {UNITS[key][not kind]}", at, value=raw)
+            raise self.source.error(f"{message} {key} in {UNITS[key][not kind]}", location, value=raw)
         if not math.isfinite(number):
-            raise self.source.error("must be a finite number", at, value=raw)
+            raise self.source.error("must be a finite number", location, value=raw)
         return number * 2 * math.pi if key == "lead" and dimension == PER_ANGLE else number
 
-    def _parsed(self, raw: Any, at: Location) -> tuple[float, Dimension | None]:
-        parsed = self.source.value(at, raw)
+    def _parsed(self, raw: Any, location: Location) -> tuple[float, Dimension | None]:
+        parsed = self.source.value(location, raw)
         assert isinstance(parsed.value, float)  # expressions are evaluated, since no names are allowed
         return parsed.value, parsed.dimension
 
     def _why_not(self, name: str) -> str:
         joint = self.system.joints.get(name) if isinstance(self.system, Robot) else None
         if joint is not None and joint.mimic is not None:
-            those = "those" if joint.mimic.several else "that one"
-            return f"this joint follows {', '.join(joint.mimic.weights)}; give {those} the drive"
+            pronoun = "those" if joint.mimic.several else "that one"
+            return f"this joint follows {', '.join(joint.mimic.weights)}; give {pronoun} the drive"
         if joint is not None:
             return "this joint is fixed and has no drive; leave it out"
         title = self.system.name if isinstance(self.system, Robot) else self.system.title or "the mechanism"

@@ -135,7 +135,7 @@ def load_motion_limits(path: str | PathLike[str], robot: Robot) -> MotionLimits:
     """
     limits_file = _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot)
     joints = limits_file.limits()
-    backward = {name: Limits(**own) for name, own in limits_file.backward.items()}
+    backward = {name: Limits(**values) for name, values in limits_file.backward.items()}
     return MotionLimits(joints, limits_file.jounce, limits_file.varying, limits_file.points(), backward)
 
 
@@ -168,21 +168,23 @@ class _LimitsFile:
         try:
             return self.robot.limits_with(limits)
         except RobotError as error:
-            at: Location = next((at[:-1] for _, at in joints.get(error.name or "", {}).values()), ("default",))
-            raise self.source.error(error.message, at, value=error.value) from None
+            location: Location = next(
+                (location[:-1] for _, location in joints.get(error.name or "", {}).values()), ("default",)
+            )
+            raise self.source.error(error.message, location, value=error.value) from None
 
     def _joints(self) -> dict[str, dict[str, tuple[Any, Location]]]:
         """Return the entries of joints by key, each with its place."""
         entries = {}
         for name in self.source.mapping(("joints",)):
-            at: Location = ("joints", name)
+            location: Location = ("joints", name)
             if name not in self.robot.joint_names:
-                raise self.source.error(self._why_not(name), at)
-            entry = self.source.mapping(at, KEYS, others=OTHER_WORDS)
-            entries[name] = {key: (raw, (*at, key)) for key, raw in entry.items()}
+                raise self.source.error(self._why_not(name), location)
+            entry = self.source.mapping(location, KEYS, others=OTHER_WORDS)
+            entries[name] = {key: (raw, (*location, key)) for key, raw in entry.items()}
         return entries
 
-    def _of(self, name: str, default: Mapping[str, Any], own: Mapping[str, tuple[Any, Location]]) -> Limits:
+    def _of(self, name: str, default: Mapping[str, Any], entries: Mapping[str, tuple[Any, Location]]) -> Limits:
         joint = self.robot.joints[name]
         values = dataclasses.asdict(joint.limits) | {"jounce": None}
         locations: dict[str, Location] = {}
@@ -190,11 +192,11 @@ class _LimitsFile:
             if self._fits(raw, key, joint):
                 locations[key] = ("default", key)
                 values[key] = self._value(raw, key, locations[key], joint)
-        for key, (raw, at) in own.items():
-            locations[key] = at
+        for key, (raw, location) in entries.items():
+            locations[key] = location
             if isinstance(raw, list) and key in VARYING and key != "jounce":
-                below, values[key] = self._range(raw, key, locations[key], joint)
-                self.backward.setdefault(name, {})[key] = below
+                minimum, values[key] = self._range(raw, key, locations[key], joint)
+                self.backward.setdefault(name, {})[key] = minimum
                 continue
             if key in VARYING and (law := self._law(raw, key, locations[key], joint)):
                 self.varying.setdefault(name, {})[key] = law
@@ -202,41 +204,41 @@ class _LimitsFile:
             values[key] = self._value(raw, key, locations[key], joint)
         lower, upper = values["lower"], values["upper"]
         if lower is not None and upper is not None and lower > upper:
-            at = locations.get("lower") or locations["upper"]
+            location = locations.get("lower") or locations["upper"]
             message = f"the lower limit of {name}, {lower:g}, must not exceed the upper one, {upper:g}"
-            raise self.source.error(f"{message}; the one not given in this file is the robot's own", at)
+            raise self.source.error(f"{message}; the one not given in this file is the robot's own", location)
         if (jounce := values.pop("jounce")) is not None:
             self.jounce[name] = jounce
         return Limits(**values)
 
-    def _range(self, raw: list[Any], key: str, at: Location, joint: Joint) -> tuple[float, float]:
+    def _range(self, raw: list[Any], key: str, location: Location, joint: Joint) -> tuple[float, float]:
         """Return the magnitudes of the lowest and the highest value of a limit that depends on the direction."""
         if len(raw) != 2:
-            raise self.source.error("must be one value, or the lowest and the highest", at, value=raw)
-        low, high = (self._number(x, key, (*at, k), joint) for k, x in enumerate(raw))
+            raise self.source.error("must be one value, or the lowest and the highest", location, value=raw)
+        low, high = (self._number(x, key, (*location, k), joint) for k, x in enumerate(raw))
         if not (math.isfinite(low) and math.isfinite(high) and low < 0 < high):
             message = "must be the lowest value, below zero, and the highest, above it, both finite"
-            raise self.source.error(message, at, value=raw)
+            raise self.source.error(message, location, value=raw)
         return -low, high
 
-    def _law(self, raw: Any, key: str, at: Location, joint: Joint) -> PositionLaw | None:
+    def _law(self, raw: Any, key: str, location: Location, joint: Joint) -> PositionLaw | None:
         """Return a position-dependent limit, from an expression of q or a table; None for a constant one."""
         if isinstance(raw, dict):
-            data = self.source.mapping(at, ("q", "value"))
+            data = self.source.mapping(location, ("q", "value"))
             columns = []
             for part, kind in (("q", "lower"), ("value", key)):
                 entries = data.get(part)
                 if not isinstance(entries, list) or len(entries) < 2:
-                    raise self.source.error("must be a list of two values or more", (*at, part), value=entries)
-                numbers = [self._value(x, kind, (*at, part, k), joint) for k, x in enumerate(entries)]
+                    raise self.source.error("must be a list of two values or more", (*location, part), value=entries)
+                numbers = [self._value(x, kind, (*location, part, k), joint) for k, x in enumerate(entries)]
                 columns.append(np.array(numbers, float))
             q, values = columns
             if len(q) != len(values) or not bool((np.diff(q) > 0).all()):
-                raise self.source.error("needs positions q that increase, and as many values", at)
+                raise self.source.error("needs positions q that increase, and as many values", location)
             return lambda position: np.interp(position, q, values)
         if not isinstance(raw, str) or not re.search(r"\bq\b", raw):
             return None
-        law = self.source.value(at, raw, "any", ("q",)).value
+        law = self.source.value(location, raw, "any", ("q",)).value
         assert isinstance(law, Expression)
 
         def limit(position: Any) -> Any:
@@ -250,72 +252,78 @@ class _LimitsFile:
         data = self.source.mapping(("points",)) if "points" in self.source.data else {}
         points = []
         for link in data:
-            at: Location = ("points", link)
+            location: Location = ("points", link)
             if link not in self.robot.frames:
-                raise self.source.error(no_such("link", link, self.robot.frames), at)
-            entry = self.source.mapping(at, ("point", "speed", "acceleration"))
+                raise self.source.error(no_such("link", link, self.robot.frames), location)
+            entry = self.source.mapping(location, ("point", "speed", "acceleration"))
             values = {
-                k: self._measured(entry[k], p, (*at, k)) for p, k in ((1, "speed"), (2, "acceleration")) if k in entry
+                k: self._measured(entry[k], p, (*location, k))
+                for p, k in ((1, "speed"), (2, "acceleration"))
+                if k in entry
             }
             point = entry.get("point", [0.0, 0.0, 0.0])
             if not isinstance(point, list) or len(point) != 3:
-                raise self.source.error("must be three lengths", (*at, "point"), value=point)
-            x, y, z = (self._measured(x, 0, (*at, "point", k)) for k, x in enumerate(point))
+                raise self.source.error("must be three lengths", (*location, "point"), value=point)
+            x, y, z = (self._measured(x, 0, (*location, "point", k)) for k, x in enumerate(point))
             points.append(PointLimits(link, **values, point=(x, y, z)))
         return tuple(points)
 
-    def _measured(self, raw: Any, rate: int, at: Location) -> float:
+    def _measured(self, raw: Any, rate: int, location: Location) -> float:
         """Return a length, speed or acceleration, by the order `rate` of the derivative; a rate must be positive."""
-        number, dimension = self._parsed(raw, at)
+        number, dimension = self._parsed(raw, location)
         expected = tuple(sorted(({"length": 1} | ({"time": -rate} if rate else {})).items()))
         if dimension and dimension != expected:
-            raise self.source.error(f"{_wrong_unit(dimension)}; it is in {('m', 'm/s', 'm/s^2')[rate]}", at, value=raw)
+            raise self.source.error(
+                f"{_wrong_unit(dimension)}; it is in {('m', 'm/s', 'm/s^2')[rate]}", location, value=raw
+            )
         if not math.isfinite(number) or (rate and number <= 0):
-            raise self.source.error("must be a finite number" + " greater than zero" * bool(rate), at, value=raw)
+            raise self.source.error("must be a finite number" + " greater than zero" * bool(rate), location, value=raw)
         return number
 
-    def _value(self, raw: Any, key: str, at: Location, joint: Joint) -> float | None:
+    def _value(self, raw: Any, key: str, location: Location, joint: Joint) -> float | None:
         """Return a limit in SI units; None if there is none."""
         if raw is None:
             return None
-        number = self._number(raw, key, at, joint)
-        self._check_size(number, raw, key, at)
+        number = self._number(raw, key, location, joint)
+        self._check_size(number, raw, key, location)
         return number
 
-    def _number(self, raw: Any, key: str, at: Location, joint: Joint) -> float:
-        number, dimension = self._parsed(raw, at)
-        if isinstance(raw, int | float) and (why := _doubt(number, key, joint)):
-            self.doubts[at] = f"{self.source.path}, line {self.source.line(at)}, {dotted(at)}: {why}"
+    def _number(self, raw: Any, key: str, location: Location, joint: Joint) -> float:
+        number, dimension = self._parsed(raw, location)
+        if isinstance(raw, int | float) and (doubt := _doubt(number, key, joint)):
+            self.doubts[location] = (
+                f"{self.source.path}, line {self.source.line(location)}, {dotted(location)}: {doubt}"
+            )
         if dimension and dimension not in _dimensions(key, joint.turning):
             unit = EXAMPLES[joint.turning][KEYS.index(key)]
             kind = "turns" if joint.turning else "slides"
             message = f"{_wrong_unit(dimension)}; a joint that {kind} has {key} in {unit}"
-            raise self.source.error(message, at, value=raw)
+            raise self.source.error(message, location, value=raw)
         return number
 
-    def _parsed(self, raw: Any, at: Location) -> tuple[float, Dimension | None]:
-        parsed = self.source.value(at, raw)
+    def _parsed(self, raw: Any, location: Location) -> tuple[float, Dimension | None]:
+        parsed = self.source.value(location, raw)
         assert isinstance(parsed.value, float)  # expressions are evaluated, since no names are allowed
         return parsed.value, parsed.dimension
 
-    def _check_size(self, number: float, raw: Any, key: str, at: Location) -> None:
+    def _check_size(self, number: float, raw: Any, key: str, location: Location) -> None:
         if not math.isfinite(number):
-            raise self.source.error("must be a finite number; null means no limit", at, value=raw)
+            raise self.source.error("must be a finite number; null means no limit", location, value=raw)
         if key not in RANGE and number <= 0:
-            raise self.source.error("must be greater than zero; null means no limit", at, value=raw)
+            raise self.source.error("must be greater than zero; null means no limit", location, value=raw)
 
     def _check_default(self, key: str) -> None:
         """Raise an error for an invalid entry of the defaults, which may suit no joint of this robot."""
-        at: Location = ("default", key)
+        location: Location = ("default", key)
         raw = self.source.data["default"][key]
         if raw is None:
             return
-        number, dimension = self._parsed(raw, at)
+        number, dimension = self._parsed(raw, location)
         if dimension and dimension not in (*_dimensions(key, True), *_dimensions(key, False)):
             turning, sliding = (EXAMPLES[kind][KEYS.index(key)] for kind in (True, False))
             message = f"{_wrong_unit(dimension)}; {key} is in {turning} or {sliding}"
-            raise self.source.error(message, at, value=raw)
-        self._check_size(number, raw, key, at)
+            raise self.source.error(message, location, value=raw)
+        self._check_size(number, raw, key, location)
 
     def _fits(self, raw: Any, key: str, joint: Joint) -> bool:
         """Return whether the unit of a default suits a joint."""
@@ -325,8 +333,8 @@ class _LimitsFile:
     def _why_not(self, name: str) -> str:
         joint = self.robot.joints.get(name)
         if joint is not None and joint.mimic is not None:
-            those = "those" if joint.mimic.several else "that one"
-            return f"this joint follows {', '.join(joint.mimic.weights)}; give limits of {those}"
+            pronoun = "those" if joint.mimic.several else "that one"
+            return f"this joint follows {', '.join(joint.mimic.weights)}; give limits of {pronoun}"
         if joint is not None:
             return "this joint is fixed and has no limits; leave it out"
         return no_such(f"moving joint of {self.robot.name}", name, self.robot.joint_names)
@@ -341,19 +349,19 @@ def _doubt(number: float, key: str, joint: Joint) -> str:
     size, part = abs(number), DEGREES if joint.turning else MILLIMETERS
     limits = joint.limits
     bounds = (limits.velocity,) if key == "velocity" else (limits.lower, limits.upper)
-    own = max((abs(x) for x in bounds if x is not None), default=0.0)
-    if own:
-        if not (size > FAR_OFF * own and own / ALIKE < size / part < own * ALIKE):
+    bound = max((abs(x) for x in bounds if x is not None), default=0.0)
+    if bound:
+        if not (size > FAR_OFF * bound and bound / ALIKE < size / part < bound * ALIKE):
             return ""
-        return f"{number:g} {unit} is {size / own:.2g} times the robot's own {own:.4g} {unit}: {number:g} {other}?"
+        return f"{number:g} {unit} is {size / bound:.2g} times the robot's own {bound:.4g} {unit}: {number:g} {other}?"
     if key == "velocity" and size > FAST[joint.turning]:
         return f"{number:g} {unit}: {number:g} {other}?"
     return number_doubt(number) if key in RANGE and joint.turning else ""
 
 
 def _wrong_unit(dimension: Dimension) -> str:
-    words = {_dimensions("effort", turning)[0]: word for turning, word in ((True, "a torque"), (False, "a force"))}
-    return f"the unit is that of {words.get(dimension) or describe_dimension(dimension)}"
+    nouns = {_dimensions("effort", turning)[0]: word for turning, word in ((True, "a torque"), (False, "a force"))}
+    return f"the unit is that of {nouns.get(dimension) or describe_dimension(dimension)}"
 
 
 def _dimensions(key: str, turning: bool) -> tuple[Dimension, ...]:

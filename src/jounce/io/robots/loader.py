@@ -131,25 +131,25 @@ def load_robot(
 
 def _warn_of_degrees(robot: Robot, path: str) -> None:
     """Warn of joints that turn by ranges as people write them in degrees, more than seven turns in fives."""
-    likely = []
+    doubtful = []
     for joint in robot.joints.values():
         ends = [joint.limits.lower, joint.limits.upper]
         if not joint.turning or None in ends:
             continue
         lower, upper = (float(end) for end in ends if end is not None)
-        fives = lower % 5 == 0 and upper % 5 == 0 and (lower % 50 != 0 or upper % 50 != 0)  # 100 stands for no limit
-        if fives and LEAST_DEGREES <= max(abs(lower), abs(upper)) <= 360:
-            likely.append(f"{joint.name} ({lower:g} to {upper:g})")
-    if likely:
-        more = len(likely) - FEW
-        listed = ", ".join(likely if more <= 0 else [*likely[:FEW], f"and {more} more"])
-        message = f"these ranges of joints look like degrees, and are read as radians: {listed}; write radians"
+        is_round = lower % 5 == 0 and upper % 5 == 0 and (lower % 50 != 0 or upper % 50 != 0)  # 100 stands for no limit
+        if is_round and LEAST_DEGREES <= max(abs(lower), abs(upper)) <= 360:
+            doubtful.append(f"{joint.name} ({lower:g} to {upper:g})")
+    if doubtful:
+        excess = len(doubtful) - FEW
+        phrase = ", ".join(doubtful if excess <= 0 else [*doubtful[:FEW], f"and {excess} more"])
+        message = f"these ranges of joints look like degrees, and are read as radians: {phrase}; write radians"
         warn_caller(UnitWarning(f"{path}: {message}"))
 
 
 def _check_expanded(root: Element, faults: Faults) -> None:
     """Raise an error for unexpanded xacro code in links and joints; other calls left in a URDF are recorded."""
-    used = [root]
+    elements = [root]
     source = any(child.tag in XACRO_SOURCE for child in root.children) or root.first("link") is None
     for child in root.children:
         if child.tag in OLD_XACRO or (child.tag.startswith("xacro:") and not source):
@@ -157,10 +157,10 @@ def _check_expanded(root: Element, faults: Faults) -> None:
             faults.leave_out(MACROS, f"<{child.tag}>", child.error(message, value=f"<{child.tag}>"))
             continue
         if child.tag in ("link", "joint"):
-            used += [element for part in child.children if part.tag not in SHAPES for element in part.walk()]
+            elements += [element for part in child.children if part.tag not in SHAPES for element in part.walk()]
         if child.tag in ("link", "joint") or child.tag.startswith("xacro:"):
-            used.append(child)
-    for element in used:
+            elements.append(child)
+    for element in elements:
         if element.tag.startswith("xacro:"):
             raise element.error(XACRO, value=f"<{element.tag}>")
         for value in element.attributes.values():

@@ -44,26 +44,26 @@ def moveit_limits(source: Source, robot: Robot) -> dict[str, dict[str, tuple[Any
     source.mapping(base, ("joint_limits", *SCALES))
     base = (*base, "joint_limits")
     joints = source.mapping(base)
-    others = [name for name in joints if name not in robot.joint_names]
-    if len(others) == len(joints):
-        raise source.error(no_such(f"moving joint of {robot.name}", others[0], robot.joint_names), (*base, others[0]))
-    notes = [f"left out, as no coordinates of {robot.name}: {', '.join(others)}"] if others else []
+    unknown = [name for name in joints if name not in robot.joint_names]
+    if len(unknown) == len(joints):
+        raise source.error(no_such(f"moving joint of {robot.name}", unknown[0], robot.joint_names), (*base, unknown[0]))
+    notes = [f"left out, as no coordinates of {robot.name}: {', '.join(unknown)}"] if unknown else []
     scales = [f"{key}: {data[key]}" for key in SCALES if data.get(key, 1) != 1]
     if scales:
         notes.append(f"{', '.join(scales)} do not count, as limits are those of joint_limits")
     if notes:
         warn_caller(RobotWarning(f"{source.path}, line {source.line(base)}, {dotted(base)}: {'; '.join(notes)}"))
-    return {name: _of(source, (*base, name)) for name in joints if name not in others}
+    return {name: _of(source, (*base, name)) for name in joints if name not in unknown}
 
 
-def _of(source: Source, at: Location) -> dict[str, tuple[Any, Location]]:
-    entry, limits = source.mapping(at, sorted(KEYS)), {}
+def _of(source: Source, location: Location) -> dict[str, tuple[Any, Location]]:
+    entry, limits = source.mapping(location, sorted(KEYS)), {}
     for key, (value, flag) in LIMITS.items():
         counts = entry.get(flag, value in entry)
         if not isinstance(counts, bool):
-            raise source.error("must be true or false", (*at, flag), value=counts)
+            raise source.error("must be true or false", (*location, flag), value=counts)
         if not counts and flag in entry:
-            limits[key] = (None, (*at, flag))
+            limits[key] = (None, (*location, flag))
         elif value in entry:
-            limits[key] = (entry[value], (*at, value))
+            limits[key] = (entry[value], (*location, value))
     return limits

@@ -133,15 +133,15 @@ def _depth_first(elements: Mapping[str, Element], by_name: bool) -> list[str]:
     """Return joints from the base outward, depth first; those of one link by name or in the order of the file."""
     names = sorted(elements, key=str.encode) if by_name else list(elements)
     ends = {name: [_link(elements[name], role) for role in ("parent", "child")] for name in names}
-    below: dict[str, list[str]] = {}
+    children_of: dict[str, list[str]] = {}
     for name in names:
-        below.setdefault(ends[name][0], []).append(name)
+        children_of.setdefault(ends[name][0], []).append(name)
     children = {child for _, child in ends.values()}
-    waiting = [name for name in reversed(names) if ends[name][0] not in children]
+    pending = [name for name in reversed(names) if ends[name][0] not in children]
     ordered = []
-    while waiting:
-        ordered.append(waiting.pop())
-        waiting += reversed(below.get(ends[ordered[-1]][1], []))
+    while pending:
+        ordered.append(pending.pop())
+        pending += reversed(children_of.get(ends[ordered[-1]][1], []))
     return ordered
 
 
@@ -176,19 +176,19 @@ def _of_several(reader: str, name: str, kind: str, element: Element, *, first: b
         raise element.error(message, "joints", name, value=kind)
     if kind == "planar":
         return _planar(reader, name, element)
-    ours = tuple(joint.name for joint in floating_joints("", prefix=name)[1])
+    names = tuple(joint.name for joint in floating_joints("", prefix=name)[1])
     if kind == "spherical":
-        return ForeignJoint(name, ours[3:], TURN, SPIN, note="velocities along the axes of the link")
+        return ForeignJoint(name, names[3:], TURN, SPIN, note="velocities along the axes of the link")
     positions, velocities, note = FREE[reader]
-    return ForeignJoint(name, ours, positions, velocities, note=note)
+    return ForeignJoint(name, names, positions, velocities, note=note)
 
 
 def _planar(reader: str, name: str, element: Element) -> ForeignJoint:
     """Return a planar joint: all programs but Pinocchio turn x and y by the shortest turn of z onto the axis."""
-    ours = tuple(f"{name}_{suffix}" for suffix in ("x", "y", "angle"))
+    names = tuple(f"{name}_{suffix}" for suffix in ("x", "y", "angle"))
     if reader == "pinocchio":
         note = "in the plane of x and y whatever the axis; velocities along the axes of the link"
-        return ForeignJoint(name, ours, ("x", "y", "cos", "sin"), ("vx", "vy", "wz"), note=note)
+        return ForeignJoint(name, names, ("x", "y", "cos", "sin"), ("vx", "vy", "wz"), note=note)
     axis = element.first("axis")
     direction = np.array((None if axis is None else axis.numbers("xyz", 3, "joints", name)) or [1.0, 0.0, 0.0])
     direction /= np.linalg.norm(direction)
@@ -200,9 +200,9 @@ def _planar(reader: str, name: str, element: Element) -> ForeignJoint:
     turn = np.cross([0.0, 0.0, 1.0], direction)
     sine = float(np.linalg.norm(turn))
     shortest = Rotation.from_rotvec(turn / sine * np.arctan2(sine, direction[2]) if sine else turn).as_matrix()
-    share = shortest[:, :2].T @ axes_with_z_along(direction)[:, :2]
-    rows = [{ours[k]: float(x) for k, x in enumerate(row) if abs(x) > 1e-15} for row in share]
-    return ForeignJoint(name, ours, ("x", "y", "angle"), ("vx", "vy", "wz"), (*rows, {ours[2]: 1.0}))
+    components = shortest[:, :2].T @ axes_with_z_along(direction)[:, :2]
+    rows = [{names[k]: float(x) for k, x in enumerate(row) if abs(x) > 1e-15} for row in components]
+    return ForeignJoint(name, names, ("x", "y", "angle"), ("vx", "vy", "wz"), (*rows, {names[2]: 1.0}))
 
 
 def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[ForeignJoint]:
@@ -215,10 +215,10 @@ def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[ForeignJoint]:
     with quiet_mujoco(mujoco):
         spec = mujoco.MjSpec.from_file(fspath(path))
     names = [joint.name or f"joint_{number}" for number, joint in enumerate(spec.joints)]
-    waiting = [joint for joint in robot.joints.values() if joint.moving or joint.name in names]
+    pending = [joint for joint in robot.joints.values() if joint.moving or joint.name in names]
     for name, joint in zip(names, spec.joints, strict=True):
         count = {mujoco.mjtJoint.mjJNT_FREE: 6, mujoco.mjtJoint.mjJNT_BALL: 3}.get(joint.type, 1)
-        parts, waiting = waiting[:count], waiting[count:]
+        parts, pending = pending[:count], pending[count:]
         if len(parts) < count:
             raise RobotFileError("MuJoCo has more joints than were read", path=fspath(path), name=name)
         ours = tuple(part.name for part in parts)

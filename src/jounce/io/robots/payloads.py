@@ -80,8 +80,8 @@ def parsed_loads(robot: Robot, texts: Iterable[str], *, moving: bool = False) ->
     form = f"a load for a part of a motion is given by LINK=MASS@FROM:TO, its ends {PLACE_FORMS}"
     loads = []
     for text in texts:
-        link, _, rest = (part.strip() for part in text.partition("="))
-        mass, _, ends = (part.strip() for part in rest.partition("@"))
+        link, _, range_text = (part.strip() for part in text.partition("="))
+        mass, _, ends = (part.strip() for part in range_text.partition("@"))
         first, _, last = (part.strip() for part in ends.partition(":"))
         if not (link and mass and (first or last)):
             raise RobotError(form, name=OPTION, value=text)
@@ -108,9 +108,9 @@ def _place(text: str) -> tuple[float | None, str | None]:
         return None, None
     if waypoint := re.fullmatch(r"waypoint\s*([0-9]+)", text):
         return float(waypoint[1]), "waypoint"
-    if share := re.fullmatch(r"([0-9.]+)\s*%", text):
+    if match := re.fullmatch(r"([0-9.]+)\s*%", text):
         try:
-            return float(share[1]) / 100, "share"
+            return float(match[1]) / 100, "share"
         except ValueError:
             raise RobotError("is no number of percent", name="place") from None
     number = parse_value(text, "time").value

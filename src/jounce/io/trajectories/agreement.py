@@ -45,19 +45,19 @@ def check_turns(recording: Recording) -> None:
         if recording.measures.get(name) == "length" or len(rows) < 4:
             continue
         steps = np.diff(recording.values[rows, 0, k])
-        rest = np.abs((steps + TURN / 2) % TURN - TURN / 2)
-        neighbors = np.maximum(np.append(0.0, rest[:-1]), np.append(rest[1:], 0.0))
+        remainders = np.abs((steps + TURN / 2) % TURN - TURN / 2)
+        neighbors = np.maximum(np.append(0.0, remainders[:-1]), np.append(remainders[1:], 0.0))
         long = np.sign(steps) * (np.abs(steps) > TURN - SMALL)
-        again = long[:-1] * long[1:] > 0  # a joint that turns so fast, or has so few samples
-        goes_on = np.append(False, again) | np.append(again, False)
-        whole = (long != 0) & ~goes_on & (neighbors < SMALL) & (rest <= SAME * neighbors + 1e-3)
-        if whole.any():
-            at = int(np.argmax(whole))
+        is_repeated = long[:-1] * long[1:] > 0  # a joint that turns so fast, or has so few samples
+        goes_on = np.append(False, is_repeated) | np.append(is_repeated, False)
+        is_turn = (long != 0) & ~goes_on & (neighbors < SMALL) & (remainders <= SAME * neighbors + 1e-3)
+        if is_turn.any():
+            index = int(np.argmax(is_turn))
             message = (
-                f"goes by {steps[at]:.6g} in one step, nearly a whole turn, as angles do that are kept within one; "
+                f"goes by {steps[index]:.6g} in one step, nearly a whole turn, as angles do that are kept within one; "
                 "count the turns, as numpy.unwrap does"
             )
-            raise recording.error(message, int(rows[at + 1]), name=name)
+            raise recording.error(message, int(rows[index + 1]), name=name)
 
 
 def without_idle_rates(recording: Recording) -> tuple[Recording, list[str]]:
@@ -96,17 +96,17 @@ def check_agreement(recording: Recording) -> list[str]:
             rows = np.flatnonzero(~np.isnan(recording.values[:, level - 1 : level + 1, k]).any(axis=1))
             if len(rows) < 4:
                 continue
-            below, rate = recording.values[rows, level - 1, k], recording.values[rows, level, k]
-            if (outliers := _outliers(recording.times[rows], below, rate)) is not None:
+            values, rate = recording.values[rows, level - 1, k], recording.values[rows, level, k]
+            if (outliers := _outliers(recording.times[rows], values, rate)) is not None:
                 first, last, expected = outliers
-                words, line = _outlier_words(recording, rows[first : last + 1], level, k), int(rows[first])
+                phrase, line = _outlier_words(recording, rows[first : last + 1], level, k), int(rows[first])
                 advice = (
                     "correct it, or leave the row out" if first == last else "correct them, or leave these rows out"
                 )
                 neighbors = f"the samples beside {'it' if first == last else 'them'} and {LEVELS[level - 1]}"
-                message = f"{words}, where {neighbors} say {expected:.6g}; {advice}"
+                message = f"{phrase}, where {neighbors} say {expected:.6g}; {advice}"
                 raise recording.error(message, line, name=name)
-            worst = _difference(recording.times[rows], below, rate)
+            worst = _difference(recording.times[rows], values, rate)
             if worst is None or worst.share < DOUBTFUL:
                 continue
             first = recording.times[rows[worst.row]]
@@ -131,7 +131,7 @@ def _outlier_words(recording: Recording, rows: np.ndarray, level: int, joint: in
     return f"{LEVELS[level]} have {len(rows)} outliers in a row from t = {first:.6g} s to {last:.6g} s{lines}: {values}"
 
 
-def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[int, int, float] | None:
+def _outliers(times: np.ndarray, values: np.ndarray, rate: np.ndarray) -> tuple[int, int, float] | None:
     """Return consecutive outliers of a rate: the first and the last sample, and the expected value of the first.
 
     An outlier is farther from the slope of the level below, and from its neighbors, than noise and the changes of the
@@ -140,10 +140,10 @@ def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[i
     if len(times) < FEWEST:
         return None
     steps = np.diff(times)
-    slopes = np.diff(below) / steps
+    slopes = np.diff(values) / steps
     before, after = steps[:-1], steps[1:]
     middle = (slopes[:-1] * after + slopes[1:] * before) / (before + after)  # slope of the parabola
-    sigmas = [float(np.median([noise(times[b], x[b]) for b in _blocks(len(times))])) for x in (below, rate)]
+    sigmas = [float(np.median([noise(times[b], x[b]) for b in _blocks(len(times))])) for x in (values, rate)]
     by_noise = NOISES * (sigmas[1] + 2 * sigmas[0] / np.minimum(before, after))
     deviation = np.abs(rate[1:-1] - middle) - by_noise  # of all samples but the first and the last
     best = None
@@ -153,17 +153,17 @@ def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[i
         turn = rate[right] - rate[left]
         windows = np.stack([slopes[k : k + groups] for k in range(1, count + 2)])
         change = np.abs(turn) + np.abs(rate[count + 3 :] - rate[:groups]) + np.ptp(windows, axis=0)
-        far = np.full(groups, np.inf)
+        excesses = np.full(groups, np.inf)
         for k in range(2, count + 2):
             own = slice(k, k + groups)
             share = (times[own] - times[left]) / (times[right] - times[left])
             noisy = by_noise[k - 1 : k - 1 + groups]
             by_neighbors = np.abs(rate[own] - rate[left] - share * turn) - noisy
-            far = np.minimum(far, np.minimum(deviation[k - 1 : k - 1 + groups], by_neighbors))
-        far -= change
-        worst = int(np.argmax(far))
-        if best is None or far[worst] > best[0]:
-            best = far[worst], worst + 2, worst + count + 1
+            excesses = np.minimum(excesses, np.minimum(deviation[k - 1 : k - 1 + groups], by_neighbors))
+        excesses -= change
+        worst = int(np.argmax(excesses))
+        if best is None or excesses[worst] > best[0]:
+            best = excesses[worst], worst + 2, worst + count + 1
     assert best is not None
     excess, first, last = best
     if excess <= OUTLYING * float(np.ptp(np.delete(rate, slice(first, last + 1)))):
@@ -174,11 +174,11 @@ def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[i
 def _blocks(count: int) -> list[slice]:
     """Return parts of the samples for separate estimates of noise, since an outlier raises that of its own part."""
     length = max(count // PARTS, FEWEST)
-    own = min(length, BLOCK)
-    return [slice(first, first + own) for first in range(0, max(count - length, 0) + 1, length)][:PARTS]
+    size = min(length, BLOCK)
+    return [slice(first, first + size) for first in range(0, max(count - length, 0) + 1, length)][:PARTS]
 
 
-def _difference(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> _Difference | None:
+def _difference(times: np.ndarray, values: np.ndarray, rate: np.ndarray) -> _Difference | None:
     """Return the difference between the integral of a rate and the level below; None if it cannot be judged."""
     steps = np.diff(times)
     length = max(1, len(steps) // WINDOWS)
@@ -186,29 +186,29 @@ def _difference(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> _Diff
     coarse = _coarse(times, rate)
     first = np.arange(0, len(times) - length, max(1, length // 2))
     last = first + length
-    given, integral = sums[last] - sums[first], below[last] - below[first]
+    given, integral = sums[last] - sums[first], values[last] - values[first]
     difference = given - integral
     block = slice(0, BLOCK)
-    sigmas = noise(times[block], below[block]), noise(times[block], rate[block])
+    sigmas = noise(times[block], values[block]), noise(times[block], rate[block])
     step = float(np.median(steps))
     by_noise = np.hypot(np.sqrt(2) * sigmas[0], sigmas[1] * step * np.sqrt(length))
     by_step = np.abs(coarse[last] - coarse[first] - given) / 3  # error of the trapezoidal rule, from twice the step
     size = max(_root(given), _root(integral))
-    beyond = np.maximum(np.abs(difference) - by_step - NOISES * by_noise, 0.0)
-    if size == 0 or not beyond.any():
+    excess = np.maximum(np.abs(difference) - by_step - NOISES * by_noise, 0.0)
+    if size == 0 or not excess.any():
         return None
-    worst = int(np.argmax(beyond))
-    return _Difference(_root(beyond) / size, int(first[worst]), float(given[worst]), float(integral[worst]))
+    worst = int(np.argmax(excess))
+    return _Difference(_root(excess) / size, int(first[worst]), float(given[worst]), float(integral[worst]))
 
 
 def _coarse(times: Float[np.ndarray, " row"], rate: Float[np.ndarray, " row"]) -> Float[np.ndarray, " row"]:
     """Return the integral of a rate by every second sample, at all samples."""
-    half = np.unique(np.append(np.arange(0, len(times), 2), len(times) - 1))
-    sums = np.append(0.0, np.cumsum(np.diff(times[half]) * (rate[half][1:] + rate[half][:-1]) / 2))
-    own = np.clip(np.searchsorted(half, np.arange(len(times)), side="right") - 1, 0, len(half) - 2)
-    since = times - times[half[own]]
-    slope = (rate[half[own + 1]] - rate[half[own]]) / (times[half[own + 1]] - times[half[own]])
-    return sums[own] + rate[half[own]] * since + slope * since**2 / 2
+    coarse = np.unique(np.append(np.arange(0, len(times), 2), len(times) - 1))
+    sums = np.append(0.0, np.cumsum(np.diff(times[coarse]) * (rate[coarse][1:] + rate[coarse][:-1]) / 2))
+    index = np.clip(np.searchsorted(coarse, np.arange(len(times)), side="right") - 1, 0, len(coarse) - 2)
+    elapsed = times - times[coarse[index]]
+    slope = (rate[coarse[index + 1]] - rate[coarse[index]]) / (times[coarse[index + 1]] - times[coarse[index]])
+    return sums[index] + rate[coarse[index]] * elapsed + slope * elapsed**2 / 2
 
 
 def _root(values: np.ndarray) -> float:

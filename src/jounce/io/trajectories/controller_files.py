@@ -152,8 +152,8 @@ def _values(
     columns = [robot.joint_names.index(name) for name in names]
     values = [q[:, k, columns] for k in range(3)]
     if efforts:
-        felt = robot if controller is None or controller.gravity else robot.with_gravity([0.0, 0.0, 0.0])
-        loaded = LoadedRobot(felt, in_time(loads), trajectory.start, trajectory.stop)
+        robot_in_gravity = robot if controller is None or controller.gravity else robot.with_gravity([0.0, 0.0, 0.0])
+        loaded = LoadedRobot(robot_in_gravity, in_time(loads), trajectory.start, trajectory.stop)
         tau = loaded.torques(q, times, controller is None or controller.drives)
         values += [tau[:, k, columns] for k in range(efforts)]
     return values

@@ -55,12 +55,12 @@ class LawFile:
             self._add_parameter(name, raw)
 
     def _add_parameter(self, name: str, raw: Any) -> None:
-        at = ("parameters", name)
-        check_parameter_name(name, self.source.error_type, **self.source.error_fields(at))
-        value = self.source.value(at, raw, "any", self.parameters, self.dimensions)
+        place = ("parameters", name)
+        check_parameter_name(name, self.source.error_type, **self.source.error_fields(place))
+        value = self.source.value(place, raw, "any", self.parameters, self.dimensions)
         if value.dimension is not None:
             self.dimensions[name] = value.dimension
-        self.parameters[name] = self._finite(value.value, raw, at)  # an expression may use the parameters above it
+        self.parameters[name] = self._finite(value.value, raw, place)  # an expression may use the parameters above it
 
     def trajectory(self) -> JointTrajectory:
         """Return the trajectory of the file."""
@@ -71,31 +71,33 @@ class LawFile:
         laws = {name: self._law(("joints", name), raw) for name, raw in self.source.mapping(("joints",)).items()}
         return self._on_grid(laws, self._times())
 
-    def _law(self, at: Location, raw: Any) -> AbstractMotion | float:
+    def _law(self, location: Location, raw: Any) -> AbstractMotion | float:
         """Return the law of a joint: an expression, a number, or samples in a column of a file."""
         if not isinstance(raw, dict):
-            value = self._value(raw, "any", at, ("t",), joint=at[-1])
+            value = self._value(raw, "any", location, ("t",), joint=location[-1])
             return ExpressionMotion(value, self.parameters) if isinstance(value, Expression) else value
-        data = self.source.mapping(at, (*_SAMPLE_KEYS, "time", "value"))
-        columns: dict[str, Any] = {key: self._text(data[key], (*at, key)) for key in ("time", "value") if key in data}
+        data = self.source.mapping(location, (*_SAMPLE_KEYS, "time", "value"))
+        columns: dict[str, Any] = {
+            key: self._text(data[key], (*location, key)) for key in ("time", "value") if key in data
+        }
         allowed = rates(("angle", "length"), _order(data))
         columns["error_type"] = TrajectoryError
-        times, values = self._samples(at, lambda path: read_samples(path, **columns, allowed=((TIME,), allowed)))
-        self._note(at[-1], self._samples(at, lambda path: sampled_dimension(path, **columns)), at)
-        return self._spline(at, data, times, values, (*at, "initial"), at[-1])
+        times, values = self._samples(location, lambda path: read_samples(path, **columns, allowed=((TIME,), allowed)))
+        self._note(location[-1], self._samples(location, lambda path: sampled_dimension(path, **columns)), location)
+        return self._spline(location, data, times, values, (*location, "initial"), location[-1])
 
     def _sampled_motion(self) -> JointTrajectory:
         """Return the trajectory whose joints are the columns of a sample file."""
-        at: Location = ("motion",)
-        data = self.source.mapping(at, _SAMPLE_KEYS)
-        times, columns, units = self._samples(at, lambda path: read_columns(path, TrajectoryError, _order(data)))
-        for name in self.source.mapping((*at, "initial")) if "initial" in data else ():
+        location: Location = ("motion",)
+        data = self.source.mapping(location, _SAMPLE_KEYS)
+        times, columns, units = self._samples(location, lambda path: read_columns(path, TrajectoryError, _order(data)))
+        for name in self.source.mapping((*location, "initial")) if "initial" in data else ():
             if name not in columns:
-                raise self.source.error(no_such("column", name, columns), (*at, "initial", name))
+                raise self.source.error(no_such("column", name, columns), (*location, "initial", name))
         for name, dimension in units.items():
-            self._note(name, dimension, at)
+            self._note(name, dimension, location)
         laws = {
-            name: self._spline(at, data, times, values, (*at, "initial", name), name)
+            name: self._spline(location, data, times, values, (*location, "initial", name), name)
             for name, values in columns.items()
         }
         return self._on_grid(laws, self._times() if "time" in self.data else times)
@@ -103,18 +105,24 @@ class LawFile:
     def _on_grid(self, laws: Mapping[str, Any], times: np.ndarray) -> JointTrajectory:
         return self._with_location(("time",), lambda: JointTrajectory(laws, times[0], times[-1], times, self.measures))
 
-    def _samples(self, at: Location, read: Callable[[str], Any]) -> Any:
+    def _samples(self, place: Location, read: Callable[[str], Any]) -> Any:
         """Return the content of the sample file that an entry names."""
-        location = (*at, "samples")
+        location = (*place, "samples")
         if self.source.at(location) is None:
             raise self.source.error("is missing; give the name of a CSV file", location)
         return self.source.read_named(self._text(self.source.at(location), location), location, read)
 
     def _spline(
-        self, at: Location, data: Mapping[str, Any], times: ArrayLike, values: ArrayLike, location: Location, joint: Any
+        self,
+        place: Location,
+        data: Mapping[str, Any],
+        times: ArrayLike,
+        values: ArrayLike,
+        location: Location,
+        joint: Any,
     ) -> SplineMotion:
         """Return the spline through samples of a coordinate, or the integral of the spline through a derivative."""
-        degree, derivative = (self._whole(data.get(key, usual), (*at, key)) for key, usual in _ORDERS)
+        degree, derivative = (self._whole(data.get(key, default), (*place, key)) for key, default in _ORDERS)
         initial = [] if self.source.at(location) is None else self.source.at(location)
         if not isinstance(initial, list):
             raise self.source.error("must be a list: the coordinate, its velocity and so on", location, value=initial)
@@ -123,48 +131,50 @@ class LawFile:
             raise self.source.error(message, location, value=initial)
         initial_values = [self._number(raw, "any", (*location, k), k, joint) for k, raw in enumerate(initial)]
         if derivative:
-            return self._with_location(at, lambda: MeasuredMotion(times, values, derivative, initial_values, degree))
-        return self._with_location(at, lambda: SplineMotion(times, values, degree))
+            return self._with_location(place, lambda: MeasuredMotion(times, values, derivative, initial_values, degree))
+        return self._with_location(place, lambda: SplineMotion(times, values, degree))
 
-    def _whole(self, raw: Any, at: Location) -> int:
+    def _whole(self, raw: Any, location: Location) -> int:
         if isinstance(raw, bool) or not isinstance(raw, int) or raw < 0:
-            raise self.source.error("must be a whole number, 0 or greater", at, value=raw)
+            raise self.source.error("must be a whole number, 0 or greater", location, value=raw)
         return raw
 
-    def _text(self, raw: Any, at: Location) -> str:
+    def _text(self, raw: Any, location: Location) -> str:
         if not isinstance(raw, str):
-            raise self.source.error("must be a name", at, value=raw)
+            raise self.source.error("must be a name", location, value=raw)
         return raw
 
     def _point_to_point(self) -> JointTrajectory:
-        at: Location = ("point_to_point",)
-        data = self.source.mapping(at, _MOTION_KEYS)
-        self._check_given(at, ("from", "to"))
-        first, last = (self.source.mapping((*at, key)) for key in ("from", "to"))
+        location: Location = ("point_to_point",)
+        data = self.source.mapping(location, _MOTION_KEYS)
+        self._check_given(location, ("from", "to"))
+        first, last = (self.source.mapping((*location, key)) for key in ("from", "to"))
         for names, other_names, key in ((first, last, "to"), (last, first, "from")):
             for name in names:
                 if name not in other_names:
                     message = f"the joint {show_value(name)} is missing; 'from' and 'to' name the same joints"
-                    raise self.source.error(message, (*at, key))
-        start = [self._number(first[name], "any", (*at, "from", name), joint=name) for name in first]
-        end = [self._number(last[name], "any", (*at, "to", name), joint=name) for name in first]
-        times = {key: self._number(data[key], "time", (*at, key)) for key in ("duration", "start_time") if key in data}
-        profile = self._text(data.get("profile", "minimum_jerk"), (*at, "profile"))
-        limits = self._limits((*at, "limits")) if "limits" in data else None
+                    raise self.source.error(message, (*location, key))
+        start = [self._number(first[name], "any", (*location, "from", name), joint=name) for name in first]
+        end = [self._number(last[name], "any", (*location, "to", name), joint=name) for name in first]
+        times = {
+            key: self._number(data[key], "time", (*location, key)) for key in ("duration", "start_time") if key in data
+        }
+        profile = self._text(data.get("profile", "minimum_jerk"), (*location, "profile"))
+        limits = self._limits((*location, "limits")) if "limits" in data else None
         motion = self._with_location(
-            at, lambda: JointTrajectory.point_to_point(list(first), start, end, profile, limits=limits, **times)
+            location, lambda: JointTrajectory.point_to_point(list(first), start, end, profile, limits=limits, **times)
         )
         return self._on_grid(motion.laws, self._times() if "time" in self.data else motion.times)
 
-    def _check_given(self, at: Location, keys: Iterable[str]) -> None:
+    def _check_given(self, location: Location, keys: Iterable[str]) -> None:
         for key in keys:
-            if key not in self.source.mapping(at):
-                raise self.source.error("is missing", (*at, key))
+            if key not in self.source.mapping(location):
+                raise self.source.error("is missing", (*location, key))
 
-    def _limits(self, at: Location) -> list[float]:
-        data = self.source.mapping(at, LIMITS)
-        self._check_given(at, LIMITS)
-        return [self._number(data[key], "any", (*at, key), power) for power, key in enumerate(LIMITS, start=1)]
+    def _limits(self, location: Location) -> list[float]:
+        data = self.source.mapping(location, LIMITS)
+        self._check_given(location, LIMITS)
+        return [self._number(data[key], "any", (*location, key), power) for power, key in enumerate(LIMITS, start=1)]
 
     def _times(self) -> np.ndarray:
         """Return the instants of the time grid."""
@@ -180,45 +190,47 @@ class LawFile:
             raise self.source.error(message, ("time",))
         return times
 
-    def _number(self, raw: Any, kind: str, at: Location, per_time: int = 0, joint: Any = None) -> float:
+    def _number(self, raw: Any, kind: str, location: Location, per_time: int = 0, joint: Any = None) -> float:
         """Return a number in SI units; "any" is a coordinate, per second to the power `per_time`."""
-        return self._finite(self._value(raw, kind, at, (), per_time, joint), raw, at)
+        return self._finite(self._value(raw, kind, location, (), per_time, joint), raw, location)
 
-    def _finite(self, value: float | Expression, raw: Any, at: Location) -> float:
+    def _finite(self, value: float | Expression, raw: Any, location: Location) -> float:
         number = (
-            self._with_location(at, lambda: value.evaluate(self.parameters)) if isinstance(value, Expression) else value
+            self._with_location(location, lambda: value.evaluate(self.parameters))
+            if isinstance(value, Expression)
+            else value
         )
         if fault := fault_of_number(number):
-            raise self.source.error(fault, at, value=raw)
+            raise self.source.error(fault, location, value=raw)
         return float(number)
 
     def _value(
-        self, raw: Any, kind: str, at: Location, names: Iterable[str] = (), per_time: int = 0, joint: Any = None
+        self, raw: Any, kind: str, location: Location, names: Iterable[str] = (), per_time: int = 0, joint: Any = None
     ) -> float | Expression:
         """Return a number in SI units, or an expression of the parameters and of other names."""
-        value = self.source.value(at, raw, kind, (*self.parameters, *names), self.dimensions)
+        value = self.source.value(location, raw, kind, (*self.parameters, *names), self.dimensions)
         if kind == "any" and value.dimension and not is_rate(value.dimension, ("angle", "length"), per_time):
             message = f"must be an angle or a length{per_power(per_time)}, not {describe_dimension(value.dimension)}"
-            raise self.source.error(message, at, value=raw)
+            raise self.source.error(message, location, value=raw)
         if joint is not None:
-            self._note(joint, value.dimension, at)
+            self._note(joint, value.dimension, location)
         return value.value
 
-    def _note(self, joint: Any, dimension: Dimension | None, at: Location) -> None:
+    def _note(self, joint: Any, dimension: Dimension | None, location: Location) -> None:
         """Record whether the unit of a law shows that the coordinate of its joint is an angle or a length."""
         measure = measured(dimension)
         if measure and self.measures.setdefault(joint, measure) != measure:
             message = f"the units of {show_value(joint)} are those of an angle here and of a length there"
-            raise self.source.error(message, at)
+            raise self.source.error(message, location)
 
-    def _with_location(self, at: Location, make: Callable[[], Any]) -> Any:
+    def _with_location(self, location: Location, make: Callable[[], Any]) -> Any:
         """Return the result of a call; errors within it get a location in the file."""
         try:
             return make()
         except JounceError as error:
             name = error.name or ""
-            entry, last = self.source.at(at), name.rpartition(".")[2]
+            entry, last = self.source.at(location), name.rpartition(".")[2]
             inside = isinstance(entry, dict) and last in entry
-            is_located = inside or not name or name.split(".")[0] in at
+            is_located = inside or not name or name.split(".")[0] in location
             message = error.message if is_located else f"{name}: {error.message}"
-            raise self.source.error(message, (*at, last) if inside else at, value=error.value) from None
+            raise self.source.error(message, (*location, last) if inside else location, value=error.value) from None

@@ -193,12 +193,12 @@ def _positions_only(recording: Recording, robot: Robot | None) -> Recording:
     other_names = [name for name in recording.names if name in recording.others and name not in joint_names]
     if not other_names:
         return recording
-    listed = ", ".join(other_names)
+    phrase = ", ".join(other_names)
     positions = [name for name in recording.names if name not in other_names]
     if not positions:
-        message = f"columns hold positions, and these have names of other quantities: {listed}; {CHOOSE}"
+        message = f"columns hold positions, and these have names of other quantities: {phrase}; {CHOOSE}"
         raise TrajectoryError(message, path=recording.path, name=other_names[0])
-    note = f"by their names no positions, and left out: {listed}; {CHOOSE}"
+    note = f"by their names no positions, and left out: {phrase}; {CHOOSE}"
     chosen = recording.selected(positions)
     return dataclasses.replace(chosen, notes=(*chosen.notes, note))
 

@@ -67,20 +67,20 @@ def load_path(
             data = source.mapping((), ("title", "path"))
             given: dict[str, Any] = {}
             for joint, raw in source.mapping(("path",)).items():
-                at = ("path", joint)
+                location = ("path", joint)
                 if isinstance(raw, list):
-                    given[joint] = [_number(source, entry, (*at, k)) for k, entry in enumerate(raw)]
+                    given[joint] = [_number(source, entry, (*location, k)) for k, entry in enumerate(raw)]
                 else:
-                    given[joint] = raw if isinstance(raw, str) else str(_number(source, raw, at))
+                    given[joint] = raw if isinstance(raw, str) else str(_number(source, raw, location))
             del data
             return _path_in_file(name, given)
     return load_trajectory(path, degree, allow, topic=topic, robot=robot, only=only)
 
 
-def _number(source: Any, raw: Any, at: tuple[Any, ...]) -> float:
-    value = source.value(at, raw).value
+def _number(source: Any, raw: Any, location: tuple[Any, ...]) -> float:
+    value = source.value(location, raw).value
     if not isinstance(value, float):
-        raise source.error("must be a number", at, value=raw)
+        raise source.error("must be a number", location, value=raw)
     return value
 
 

@@ -95,8 +95,8 @@ def _as_points(recording: Recording, joint: int) -> AbstractMotion:
 def _trimmed(table: Float[np.ndarray, "row level"]) -> Float[np.ndarray, "row known"]:
     """Return a table without the levels that no two adjacent points have."""
     present = ~np.isnan(table)
-    both = (present[1:] & present[:-1]).any(axis=0)
-    return table[:, : int(np.argmin(np.append(both, False)))]
+    have_both = (present[1:] & present[:-1]).any(axis=0)
+    return table[:, : int(np.argmin(np.append(have_both, False)))]
 
 
 def _ends(law: Any) -> tuple[float, float]:

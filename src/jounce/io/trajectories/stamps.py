@@ -63,9 +63,9 @@ def relative(
             values[k] = float(text) if "_" not in text else np.nan
         except ValueError:
             values[k] = np.nan
-    bad = np.flatnonzero(~np.isfinite(values))
-    if len(bad):
-        raise fail("must be a finite number", int(bad[0]))
+    invalid = np.flatnonzero(~np.isfinite(values))
+    if len(invalid):
+        raise fail("must be a finite number", int(invalid[0]))
     try:
         exact = [Decimal(text.strip()) for text in texts[:1]]
         epoch_unit = epoch(exact[0], per_second, unit) if exact else None
@@ -74,8 +74,8 @@ def relative(
         exact = [Decimal(text.strip()) for text in texts]
     except InvalidOperation:  # a form that only float can read
         return values, ""
-    digits, words = epoch_unit
-    return np.array([float((stamp - exact[0]).scaleb(-digits)) for stamp in exact]), words
+    digits, phrase = epoch_unit
+    return np.array([float((stamp - exact[0]).scaleb(-digits)) for stamp in exact]), phrase
 
 
 def _seconds_of_date(text: str) -> str | None:
@@ -116,7 +116,7 @@ def epoch(first: Decimal, per_second: int = 1, unit: str | None = None) -> tuple
     scales = SCALES[:1] if per_second == NANO else SCALES
     if unit is not None:
         scales = [(EPOCH * 10**digits, digits, name) for _, digits, name in SCALES if name == unit]
-    scale = next(((digits, unit) for least, digits, unit in scales if abs(first) >= least), None)
+    scale = next(((digits, unit) for lower, digits, unit in scales if abs(first) >= lower), None)
     if scale is None:
         return None
     digits, unit = scale
@@ -154,21 +154,21 @@ def gaps(recording: Recording) -> list[str]:
         rows = np.flatnonzero(~np.isnan(recording.values[:, 0, joint]))
         times = recording.times[rows]
         steps = np.diff(times)
-        wide = np.flatnonzero(steps > GAP * np.median(steps)) if len(steps) else []
-        if not len(wide):
+        gap_indices = np.flatnonzero(steps > GAP * np.median(steps)) if len(steps) else []
+        if not len(gap_indices):
             continue
-        k = int(wide[np.argmax(steps[wide])])
+        k = int(gap_indices[np.argmax(steps[gap_indices])])
         line = f" (line {recording.lines[rows[k + 1]]})" if len(recording.lines) else ""
-        more = f", the longest of {len(wide)} gaps" if len(wide) > 1 else ""
-        words = f"no samples between t = {times[k]:.6g} and {times[k + 1]:.6g} s{line}{more}"
-        notes.setdefault(words, []).append(name)
+        remark = f", the longest of {len(gap_indices)} gaps" if len(gap_indices) > 1 else ""
+        phrase = f"no samples between t = {times[k]:.6g} and {times[k + 1]:.6g} s{line}{remark}"
+        notes.setdefault(phrase, []).append(name)
     advice = "the motion there is what a spline makes of those beside"
-    return [f"{words}, of {', '.join(names)}: {advice}" for words, names in notes.items()]
+    return [f"{phrase}, of {', '.join(names)}: {advice}" for phrase, names in notes.items()]
 
 
 def _sorted(recording: Recording, steps: np.ndarray) -> Recording:
-    late = np.flatnonzero(steps < 0) + 1
-    row, usual = int(late[0]), float(np.median(np.abs(steps[steps != 0])))
+    rows = np.flatnonzero(steps < 0) + 1
+    row, typical = int(rows[0]), float(np.median(np.abs(steps[steps != 0])))
     latest = np.maximum.accumulate(recording.times)
     back = float((latest - recording.times).max())
     order = np.argsort(recording.times, kind="stable")
@@ -176,10 +176,12 @@ def _sorted(recording: Recording, steps: np.ndarray) -> Recording:
         f"comes before that of line {recording.lines[row - 1]}" if len(recording.lines) else "comes before another"
     )
     value = {"name": "time", "value": float(recording.times[row])}
-    if back > BACK * usual or _path_length(recording.values[order, 0]) > ROUGHER * _path_length(recording.values[:, 0]):
+    if back > BACK * typical or _path_length(recording.values[order, 0]) > ROUGHER * _path_length(
+        recording.values[:, 0]
+    ):
         advice = "times start again, or stamps and rows do not belong together; give one recording"
         raise recording.error(f"the stamp {message}: {advice}", row, **value)
-    note = f"{len(late)} rows were out of order, and are sorted by their stamps"
+    note = f"{len(rows)} rows were out of order, and are sorted by their stamps"
     return _taken(recording, order, f"{note}{_at(recording, row)}")
 
 
@@ -191,25 +193,27 @@ def _path_length(positions: np.ndarray) -> float:
 def _merged(recording: Recording) -> Recording:
     """Return a recording with one row for each stamp: the mean of rows that differ by less than a step."""
     times, positions = recording.times, recording.values[:, 0]
-    again = np.flatnonzero(np.diff(times) == 0) + 1
-    if not len(again):
+    repeats = np.flatnonzero(np.diff(times) == 0) + 1
+    if not len(repeats):
         return recording
     if recording.points:
-        same = np.array_equal(recording.values[again], recording.values[again - 1], equal_nan=True)
-        if not same:
-            unlike = [k for k in again if not np.array_equal(*recording.values[k - 1 : k + 1], equal_nan=True)]
+        are_equal = np.array_equal(recording.values[repeats], recording.values[repeats - 1], equal_nan=True)
+        if not are_equal:
+            differing = [k for k in repeats if not np.array_equal(*recording.values[k - 1 : k + 1], equal_nan=True)]
             message = "must come after that of the point before, which is another one"
-            raise recording.error(message, unlike[0], name="time", value=float(times[unlike[0]]))
-    differences = np.abs(positions[again] - positions[again - 1])
-    differ = np.nan_to_num(differences) > 0
-    if differ.any():
-        moved = np.abs(np.diff(positions, axis=0))
-        neighbors = np.concatenate([again - 2, again - 1, again])  # steps to and from repeated rows are not typical
-        moved[neighbors[(neighbors >= 0) & (neighbors < len(moved))]] = 0.0
-        usual = SAME * np.nan_to_num(moved).max(axis=0)
-        bad = np.argwhere(np.nan_to_num(differences) > usual)
-        if len(bad):
-            row, joint = int(again[bad[0][0]]), int(bad[0][1])
+            raise recording.error(message, differing[0], name="time", value=float(times[differing[0]]))
+    differences = np.abs(positions[repeats] - positions[repeats - 1])
+    is_different = np.nan_to_num(differences) > 0
+    if is_different.any():
+        steps = np.abs(np.diff(positions, axis=0))
+        neighbors = np.concatenate(
+            [repeats - 2, repeats - 1, repeats]
+        )  # steps to and from repeated rows are not typical
+        steps[neighbors[(neighbors >= 0) & (neighbors < len(steps))]] = 0.0
+        allowed = SAME * np.nan_to_num(steps).max(axis=0)
+        conflicts = np.argwhere(np.nan_to_num(differences) > allowed)
+        if len(conflicts):
+            row, joint = int(repeats[conflicts[0][0]]), int(conflicts[0][1])
             fact = f"{positions[row - 1, joint]:.9g} and {positions[row, joint]:.9g}"
             message = f"times must increase; this one repeats the one before, and this joint is at {fact} then"
             raise recording.error(message, row, name=recording.names[joint], value=float(times[row]))
@@ -222,11 +226,11 @@ def _merged(recording: Recording) -> Recording:
     np.add.at(counts, group, present)
     with np.errstate(invalid="ignore"):
         values = np.where(counts > 0, values / counts, np.nan)
-    rows = int(differ.any(axis=1).sum())
-    how = "left out" if not rows else f"merged, {rows} of them by the mean of different values"
-    note = f"{len(again)} repeated stamps are {how}{_at(recording, int(again[0]))}"
-    whole = _taken(recording, first, note)
-    return dataclasses.replace(whole, values=values)
+    rows = int(is_different.any(axis=1).sum())
+    outcome = "left out" if not rows else f"merged, {rows} of them by the mean of different values"
+    note = f"{len(repeats)} repeated stamps are {outcome}{_at(recording, int(repeats[0]))}"
+    merged = _taken(recording, first, note)
+    return dataclasses.replace(merged, values=values)
 
 
 def _at(recording: Recording, row: int) -> str:

@@ -81,10 +81,10 @@ def other_quantity(name: str) -> str | None:
     >>> [other_quantity(name) for name in ("tau_a", "motorTorque", "elbow", "current_pos", "torque_tube_joint")]
     ['tau', 'Torque', None, None, 'torque']
     """
-    words = _BETWEEN_WORDS.split(name)
-    if any(WORDS.get(word.lower()) == POSITION for word in words):
+    parts = _BETWEEN_WORDS.split(name)
+    if any(WORDS.get(word.lower()) == POSITION for word in parts):
         return None
-    return next((word for word in words if word.lower() in OTHER_QUANTITIES), None)
+    return next((word for word in parts if word.lower() in OTHER_QUANTITIES), None)
 
 
 def take_units(table: Table) -> None:

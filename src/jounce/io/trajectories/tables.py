@@ -90,29 +90,29 @@ def _recording(table: Table, columns: Columns, *, points: bool) -> Recording:
         dimensions.append(table.unit(own[0])[1])
         if column := columns.checked.get(joint):
             _check_rate(table, columns, joint, values[:, :1, k], _numbers(table, column, 1, empty=False))
-    times, words = _times(table, columns)
-    some = ~np.isnan(values[:, 0]).all(axis=1)
-    empty = int((~some).sum())
-    notes = [words] if words else []
+    times, note = _times(table, columns)
+    has_values = ~np.isnan(values[:, 0]).all(axis=1)
+    empty_count = int((~has_values).sum())
+    notes = [note] if note else []
     for name, own in zip(names, columns.joints.values(), strict=True):
         if not _is_series(table.header[own[POSITION]]):
-            absent = np.flatnonzero(np.isnan(values[:, POSITION, names.index(name)]) & some)
+            absent = np.flatnonzero(np.isnan(values[:, POSITION, names.index(name)]) & has_values)
             if len(absent):
                 missing.append(f"{len(absent)} of {name} (the first in line {table.line(int(absent[0]))})")
     if missing:
         notes.append(f"positions are missing, and left to the splines: {', '.join(missing)}")
-    if empty:
-        notes.append(f"{empty} rows without a position are left out")
-    if not some.any():
+    if empty_count:
+        notes.append(f"{empty_count} rows without a position are left out")
+    if not has_values.any():
         raise table.error("no row has a position", line=table.header_line)
-    lines = np.array([table.line(k) for k in range(len(table))])[some]
-    unknown = np.isnan(values[some]).all(axis=(0, 2))
+    lines = np.array([table.line(k) for k in range(len(table))])[has_values]
+    unknown = np.isnan(values[has_values]).all(axis=(0, 2))
     count = int(np.argmax(np.append(unknown, True)))
     return Recording(
         table.path,
         names,
-        times[some],
-        values[some][:, :count],
+        times[has_values],
+        values[has_values][:, :count],
         lines,
         points=points,
         notes=tuple(notes),
@@ -149,8 +149,8 @@ def _names(table: Table, columns: Columns) -> tuple[str, ...]:
                 raise table.error(message, line=table.line(k), name=table.header[column], value=text)
         names.append(texts[0])
     if len(set(names)) < len(names):
-        twice = next(name for k, name in enumerate(names) if name in names[:k])
-        raise table.error("a joint is named twice", line=table.line(0), value=twice)
+        duplicate = next(name for k, name in enumerate(names) if name in names[:k])
+        raise table.error("a joint is named twice", line=table.line(0), value=duplicate)
     return tuple(names)
 
 
@@ -182,15 +182,15 @@ def _times(table: Table, columns: Columns) -> tuple[Float[np.ndarray, " row"], s
         epoch_unit = None if origin is None else epoch(origin, _units(columns, values), unit)
         if epoch_unit is None:
             return (values / _units(columns, values) if unit is None else values), ""
-        digits, words = epoch_unit
-        return table.numbers.values[:, columns.time] / 10**digits, words
+        digits, note = epoch_unit
+        return table.numbers.values[:, columns.time] / 10**digits, note
 
     def fail(message: str, row: int) -> TrajectoryError:
         return table.error(message, line=table.line(row), name=name, value=table.rows[row][1][columns.time])  # type: ignore[return-value]
 
-    values, words = relative([row[columns.time] for _, row in table.rows], fail, columns.per_second, unit)
-    if words:
-        return values, words
+    values, note = relative([row[columns.time] for _, row in table.rows], fail, columns.per_second, unit)
+    if note:
+        return values, note
     return values / _units(columns, values) if unit is None else values * size, ""
 
 

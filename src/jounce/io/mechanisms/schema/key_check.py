@@ -66,39 +66,41 @@ def check_keys(path: str | PathLike[str]) -> None:
         raise min(problems, key=lambda problem: problem.line or 0)
 
 
-def unknown_key(source: Source, space: str, at: Location, valid: Iterable[str]) -> JounceError:
+def unknown_key(source: Source, space: str, location: Location, valid: Iterable[str]) -> JounceError:
     """Return the error for an unknown key of an entry, with the valid ones."""
-    hint = _HINTS.get((space, str(at[-1]))) if at[0] == "bodies" else None
-    if str(at[-1])[:1].isdigit():
+    hint = _HINTS.get((space, str(location[-1]))) if location[0] == "bodies" else None
+    if str(location[-1])[:1].isdigit():
         hint = "a comma ends a value here; for a decimal comma write a point, such as 4.5 mm"
-    return source.error(f"unknown key {show_value(at[-1])}; {hint or did_you_mean(at[-1], valid)}", at)
+    return source.error(
+        f"unknown key {show_value(location[-1])}; {hint or did_you_mean(location[-1], valid)}", location
+    )
 
 
 def unknown_type(
-    source: Source, space: str, at: Location, entry: dict[str, Any], types: Callable[[str, str], Iterable[str]]
+    source: Source, space: str, location: Location, entry: dict[str, Any], types: Callable[[str, str], Iterable[str]]
 ) -> JounceError:
     """Return the error for a joint, driver or force without a valid type; `types` returns the valid ones."""
-    role = ROLES[str(at[0])]
+    role = ROLES[str(location[0])]
     valid = types(space, role)
     glued = next((key for key in entry if str(key).startswith("type:")), None)
     if "type" not in entry and glued is not None:
         return source.error(
-            f"a colon must be followed by a space: write {str(glued).replace(':', ': ', 1)}", (*at, glued)
+            f"a colon must be followed by a space: write {str(glued).replace(':', ': ', 1)}", (*location, glued)
         )
     if "type" not in entry:
-        return source.error(f"is missing; valid: {', '.join(sorted(valid))}", (*at, "type"))
+        return source.error(f"is missing; valid: {', '.join(sorted(valid))}", (*location, "type"))
     name = entry["type"]
-    elsewhere = [
+    other_spaces = [
         f"a {other_space} {other_role}"
         for other_space in ("planar", "spatial")
         for other_role in ("joint", "driver", "force")
         if isinstance(name, str) and name in types(other_space, other_role)
     ]
-    note = f"it is the type of {' and '.join(elsewhere)}; " if elsewhere else ""
-    synonyms = [word for word in valid if str(name).lower() in _OTHER_WORDS.get(word, ()) and not elsewhere]
+    note = f"it is the type of {' and '.join(other_spaces)}; " if other_spaces else ""
+    synonyms = [word for word in valid if str(name).lower() in _OTHER_WORDS.get(word, ()) and not other_spaces]
     hint = f"it is called '{synonyms[0]}' here" if synonyms else note + did_you_mean(name, valid)
     message = f"no {space} {role} has this type; {hint}"
-    return source.error(message, (*at, "type"), value=name)
+    return source.error(message, (*location, "type"), value=name)
 
 
 @functools.cache
@@ -116,8 +118,8 @@ def _problems(source: Source, space: str, schema: dict[str, Any]) -> Iterator[Jo
     data = source.data
     yield from _unknown(source, space, (), data, schema[f"{space}_mechanism"])
     entries = {section: data[section] for section in (*ROLES, "bodies") if isinstance(data.get(section), dict)}
-    for section, named in entries.items():
-        for name, entry in named.items():
+    for section, names in entries.items():
+        for name, entry in names.items():
             if not isinstance(entry, dict):
                 continue
             if section == "bodies":
@@ -141,10 +143,10 @@ def _types(space: str, role: str) -> list[str]:
 
 
 def _unknown(
-    source: Source, space: str, at: Location, entry: dict[str, Any], model: dict[str, Any]
+    source: Source, space: str, location: Location, entry: dict[str, Any], model: dict[str, Any]
 ) -> Iterator[JounceError]:
     """Yield an error for each key of an entry that is not in its model."""
     valid = model["properties"]
     for key in entry:
         if key not in valid:
-            yield unknown_key(source, space, (*at, key), valid)
+            yield unknown_key(source, space, (*location, key), valid)

@@ -62,8 +62,8 @@ def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
     fields = value_fields(kind)
     groups: dict[str, list[str]] = {}
     parts = getattr(kind, "parts", {})
-    within = {field for members in parts.values() for field in members.values()}
-    for name in (name for name in fields if name not in within):
+    nested = {field for members in parts.values() for field in members.values()}
+    for name in (name for name in fields if name not in nested):
         stem, _, body = name.rpartition("_")
         groups.setdefault(stem if stem in _PLURALS and body in ("i", "j", "m") else name, []).append(name)
     keys = []
@@ -98,8 +98,8 @@ def is_cam(space: str, entry: dict[str, Any]) -> bool:
     kind = entry.get("type")
     if "motion" not in entry or not isinstance(kind, str) or kind not in cam_types(space):
         return False
-    own = catalogue(space, "joint").get(kind)
-    return own is None or all(key.key != "motion" for key in file_keys(own))
+    classes = catalogue(space, "joint").get(kind)
+    return classes is None or all(key.key != "motion" for key in file_keys(classes))
 
 
 def location_of(keys: Iterable[FileKey], field: str) -> Location:

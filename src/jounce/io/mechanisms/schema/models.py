@@ -118,12 +118,12 @@ def _names(counts: Sequence[int]) -> Any:
     return Annotated[Any, Checked(check, schema)]
 
 
-def _check_body(name: Any, info: Any, *at: int) -> str:
+def _check_body(name: Any, info: Any, *location: int) -> str:
     if not isinstance(name, str):
-        raise problem("must be the name of a body", *at, value=name)
+        raise problem("must be the name of a body", *location, value=name)
     bodies = (info.context or {}).get("bodies", ())
     if name not in bodies:
-        raise problem(no_such("body", name, bodies), *at, value=name)
+        raise problem(no_such("body", name, bodies), *location, value=name)
     return name
 
 
@@ -134,11 +134,11 @@ def _check_file_name(name: object, error: type[JounceError]) -> None:
 
 def _named(item: Any, *checks: Callable[[Any, type[JounceError]], None], pattern: re.Pattern[str] | None = None) -> Any:
     """Return the annotation of a mapping of names to items; the default pattern is that of names in files."""
-    whole = checks if pattern else (_check_file_name, *checks)
+    all_checks = checks if pattern else (_check_file_name, *checks)
 
     def name_of(raw: object, _info: Any) -> Any:
         try:
-            for check in whole:
+            for check in all_checks:
                 check(raw, MechanismFileError)
         except JounceError as error:
             raise problem(error.message) from None
@@ -192,8 +192,8 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
         case "flag" | "whole" | "wrenches" | "nested":
             return nested(friction_class(kind)) if key.kind == "nested" else _PLAIN[key.kind]
     choices = facts_of(kind).choices.get(key.fields[0])
-    words = {"enum": list(choices)} if choices else {"type": "string"}
-    return Annotated[Any, Checked(_text, words)]
+    schema = {"enum": list(choices)} if choices else {"type": "string"}
+    return Annotated[Any, Checked(_text, schema)]
 
 
 def _has_free_laws(kind: type[Any]) -> bool:
@@ -227,8 +227,8 @@ def _constraint_union(space: str, role: str, types: _Types) -> Any:
         fields = {"type": (Literal[name], ...)} | _bodies(kind) | _values(kind, POSITION_COMPONENTS[space])
         (law,) = (key for key in file_keys(kind) if key.kind == "motion")
         fields[law.key] = (cam_motion(law.quantity), ...)
-        words = f"A cam, by its law of another coordinate. {kind.__doc__}"
-        models.append(Annotated[_model(f"{space}_{name}_cam", words, fields), Tag(f"{name} cam")])
+        description = f"A cam, by its law of another coordinate. {kind.__doc__}"
+        models.append(Annotated[_model(f"{space}_{name}_cam", description, fields), Tag(f"{name} cam")])
 
     def form(raw: object) -> Any:
         if not isinstance(raw, dict):

@@ -35,33 +35,33 @@ def first_problem(source: Source, space: str, problems: list[Any]) -> JounceErro
 
 def _location(problem: Any) -> Location:
     """Return the location of a problem in the file: without the tags of pydantic, and with the entry within a value."""
-    at: Location = problem["loc"]
-    if at and at[-1] == "[key]":
-        at = at[:-1]
-    if len(at) > 2 and at[0] in (*ROLES, "outputs"):
-        at = (*at[:2], *at[3:])
-    return (*at, *problem.get("ctx", {}).get("at", ()))
+    location: Location = problem["loc"]
+    if location and location[-1] == "[key]":
+        location = location[:-1]
+    if len(location) > 2 and location[0] in (*ROLES, "outputs"):
+        location = (*location[:2], *location[3:])
+    return (*location, *problem.get("ctx", {}).get("at", ()))
 
 
 def _word(source: Source, space: str, problem: Any) -> JounceError:
-    at, value, context = _location(problem), problem["input"], problem.get("ctx", {})
+    location, value, context = _location(problem), problem["input"], problem.get("ctx", {})
     match problem["type"]:
         case "jounce":
-            stated = context["value"]
-            return source.error(context["message"], at, value=value if stated is ... else stated)
+            message = context["value"]
+            return source.error(context["message"], location, value=value if message is ... else message)
         case "extra_forbidden":
-            return unknown_key(source, space, at, _valid_keys(source, space, at[:-1]))
+            return unknown_key(source, space, location, _valid_keys(source, space, location[:-1]))
         case "missing":
-            return source.error("is missing", at)
+            return source.error("is missing", location)
         case "union_tag_not_found" | "union_tag_invalid" if not isinstance(value, dict):
-            return source.error("must be a mapping", at, value=value)
+            return source.error("must be a mapping", location, value=value)
         case "union_tag_not_found" | "union_tag_invalid":
-            return _unknown_type(source, space, at, value)
+            return _unknown_type(source, space, location, value)
         case "dict_type" | "model_type" | "model_attributes_type":
-            return source.error("must be a mapping", at, value=value)
+            return source.error("must be a mapping", location, value=value)
         case "literal_error":
-            return source.error(f"must be {context['expected']}", at, value=value)
-    return source.error(f"is not valid: {problem['msg']}", at, value=value)
+            return source.error(f"must be {context['expected']}", location, value=value)
+    return source.error(f"is not valid: {problem['msg']}", location, value=value)
 
 
 def _valid_keys(source: Source, space: str, parent: Location) -> list[str]:
@@ -84,17 +84,17 @@ def _valid_keys(source: Source, space: str, parent: Location) -> list[str]:
     return ["type", "body" if constraint.body_count == 1 else "bodies", *(key.key for key in file_keys(constraint))]
 
 
-def _unknown_type(source: Source, space: str, at: Location, entry: dict[str, Any]) -> JounceError:
+def _unknown_type(source: Source, space: str, location: Location, entry: dict[str, Any]) -> JounceError:
     """Return the error for a joint, driver, force or output of an unknown type."""
-    if at[0] == "outputs":
-        return _unknown_output(source, space, at, entry)
-    return unknown_type(source, space, at, entry, catalogue)
+    if location[0] == "outputs":
+        return _unknown_output(source, space, location, entry)
+    return unknown_type(source, space, location, entry, catalogue)
 
 
-def _unknown_output(source: Source, space: str, at: Location, entry: dict[str, Any]) -> JounceError:
+def _unknown_output(source: Source, space: str, place: Location, entry: dict[str, Any]) -> JounceError:
     quantity, forms = entry.get("quantity"), output_types(space)
     quantities = {word for word, _ in forms.values() if word}
-    location = (*at, "quantity")
+    location = (*place, "quantity")
     for holder in ("driver", "joint", "force"):
         if holder in entry:
             valid = [word for word, kind in forms.values() if word and output_holder(kind) == holder]
@@ -107,8 +107,8 @@ def _unknown_output(source: Source, space: str, at: Location, entry: dict[str, A
         return source.error(message, location, value=quantity)
     if isinstance(quantity, str) and quantity in quantities:
         body = "bodies: [i, j]" if "bodies" not in entry else "body"
-        return source.error(f"in {space} space the quantity '{quantity}' takes {body}", at, value=entry)
+        return source.error(f"in {space} space the quantity '{quantity}' takes {body}", place, value=entry)
     if quantity is None:
         message = "give a point of one body, or a quantity"
-        return source.error(f"{message}; {did_you_mean('', quantities)}", at, value=entry)
+        return source.error(f"{message}; {did_you_mean('', quantities)}", place, value=entry)
     return source.error(no_such("output", quantity, quantities, "quantity"), location, value=quantity)

@@ -60,18 +60,18 @@ def warn_of_units(source: Source, mechanism: Mechanism) -> None:
     """
     warned = set()
     for location, value in _angles(source.data, mechanism):
-        if why := number_doubt(value):
+        if doubt := number_doubt(value):
             warned.add(location[:3])
-            _warn(source, location, why)
+            _warn(source, location, doubt)
     run, laws = _run(mechanism), list(laws_of_angles(mechanism))
     angles = frozenset(name for name, dimensions in mechanism.dimensions.items() if ANGLE in dimensions)
     for law in laws:
-        at: Location = ("drivers", law.name, "motion")
-        why = degrees_doubt(law.law, *run)
-        if at in warned or why:
+        place: Location = ("drivers", law.name, "motion")
+        doubt = degrees_doubt(law.law, *run)
+        if place in warned or doubt:
             settle(law.driver)  # warned of now, or confirmed by its unit
-        if why and at not in warned and not names_angle(law, angles) and not _has_unit(source, at):
-            _warn(source, at, why)
+        if doubt and place not in warned and not names_angle(law, angles) and not _has_unit(source, place):
+            _warn(source, place, doubt)
     _warn_of_lengths(source, mechanism, laws)
 
 
@@ -102,11 +102,11 @@ def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], op
     doubted_before = {law.name for law in laws_of_angles(before) if degrees_doubt(law.law, *run)}
     run = _run(after)
     for law in laws_of_angles(after):
-        if not (why := degrees_doubt(law.law, *run)):
+        if not (doubt := degrees_doubt(law.law, *run)):
             continue
         settle(law.driver)
         if not warned and law.name not in doubted_before:
-            warnings.warn(UnitWarning(f"{option}: now the law of drivers.{law.name} {why} {IN_SI}"), stacklevel=3)
+            warnings.warn(UnitWarning(f"{option}: now the law of drivers.{law.name} {doubt} {IN_SI}"), stacklevel=3)
 
 
 def warn_of_variations(mechanism: Mechanism, forms: Mapping[str, str], option: str) -> None:
@@ -138,8 +138,8 @@ def warn_of_variations(mechanism: Mechanism, forms: Mapping[str, str], option: s
             if not spread or ANGLE in dimensions:
                 hint = _doubt(dimensions, value, nominal, "what it is")
             else:
-                wide = LENGTH in dimensions and value > WIDE * nominal > 0
-                hint = f"a spread of {text} m about {nominal:g} m: {text} mm?" if wide else ""
+                is_wide = LENGTH in dimensions and value > WIDE * nominal > 0
+                hint = f"a spread of {text} m about {nominal:g} m: {text} mm?" if is_wide else ""
             if hint:
                 warnings.warn(UnitWarning(f"{option} {name}: {hint} {IN_SI}"), stacklevel=3)
                 break
@@ -153,18 +153,18 @@ def is_plain(text: str) -> bool:
         return False
 
 
-def _doubt(dimensions: Iterable[Dimension], value: float, was: float, which: str) -> str:
+def _doubt(dimensions: Iterable[Dimension], value: float, reference: float, label: str) -> str:
     """Return why the number of a parameter is likely in degrees or millimeters; an empty text if it is not."""
     if ANGLE in dimensions and (hint := number_doubt(value)):
         return hint
-    if LENGTH in dimensions and was and is_thousandfold(abs(value), abs(was)):
-        return f"{value:g} m is {float(f'{abs(value / was):.1g}'):g} times {which}: {value:g} mm?"
+    if LENGTH in dimensions and reference and is_thousandfold(abs(value), abs(reference)):
+        return f"{value:g} m is {float(f'{abs(value / reference):.1g}'):g} times {label}: {value:g} mm?"
     return ""
 
 
-def is_thousandfold(value: float, usual: float, times: float = FAR_OFF) -> bool:
+def is_thousandfold(value: float, typical: float, times: float = FAR_OFF) -> bool:
     """Return whether a length is far larger than usual, but usual if it is in millimeters."""
-    return value > times * usual and usual / ALIKE < value / 1000 < ALIKE * usual
+    return value > times * typical and typical / ALIKE < value / 1000 < ALIKE * typical
 
 
 def _run(mechanism: Mechanism) -> tuple[float, float]:
@@ -176,42 +176,42 @@ def _run(mechanism: Mechanism) -> tuple[float, float]:
     return (0.0, 1.0) if instants is None else (float(instants[0]), float(instants[-1]))
 
 
-def _has_unit(source: Source, at: Location) -> bool:
+def _has_unit(source: Source, location: Location) -> bool:
     """Return whether the samples of a law state their unit."""
-    raw = source.at(at)
+    raw = source.at(location)
     if not isinstance(raw, dict) or not isinstance(raw.get("samples"), str):
         return False
     columns = {key: raw[key] for key in ("time", "value") if key in raw}
     try:
-        return bool(source.read_named(raw["samples"], at, lambda path: sampled_dimension(path, **columns)))
+        return bool(source.read_named(raw["samples"], location, lambda path: sampled_dimension(path, **columns)))
     except JounceError:
         return False
 
 
-def _warn_of_length_laws(source: Source, mechanism: Mechanism, usual: float) -> None:
+def _warn_of_length_laws(source: Source, mechanism: Mechanism, typical: float) -> None:
     """Warn of length laws that go too far and too fast for a machine of the usual length."""
     first, last = _run(mechanism)
     for name, _, law in laws_of(mechanism, "length"):
-        at: Location = ("drivers", name, "motion")
-        if last <= first or _has_unit(source, at) or not _has_plain_number(source, law, FAR_OFF * usual):
+        location: Location = ("drivers", name, "motion")
+        if last <= first or _has_unit(source, location) or not _has_plain_number(source, law, FAR_OFF * typical):
             continue
         if (values := values_of(law, first, last)) is None:
             continue
         farthest = float(np.abs(values).max())
         fastest = float(np.abs(np.diff(values)).max()) * (len(values) - 1) / (last - first)
-        if fastest > FAST and is_thousandfold(farthest, usual):
-            ways = f"goes to {farthest:.3g} m at up to {fastest:.3g} m/s, where lengths are about {usual:.3g} m"
-            _warn(source, at, f"{ways}: millimeters?")
+        if fastest > FAST and is_thousandfold(farthest, typical):
+            ways = f"goes to {farthest:.3g} m at up to {fastest:.3g} m/s, where lengths are about {typical:.3g} m"
+            _warn(source, location, f"{ways}: millimeters?")
 
 
-def _has_plain_number(source: Source, law: AbstractMotion, least: float) -> bool:
-    """Return whether an expression or its parameters have a plain number above `least`; True for other laws."""
+def _has_plain_number(source: Source, law: AbstractMotion, bound: float) -> bool:
+    """Return whether an expression or its parameters have a plain number above `bound`; True for other laws."""
     if not isinstance(law, ExpressionMotion):
         return True
     parameters = source.data.get("parameters") or {}
     given = [parameters.get(name) for name in law.expression.names]
     numbers = [*(x for x in given if isinstance(x, int | float)), *map(float, NUMBER.findall(law.expression.text))]
-    return max(map(abs, numbers), default=0.0) > least
+    return max(map(abs, numbers), default=0.0) > bound
 
 
 def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[DriverLaw]) -> None:
@@ -221,22 +221,22 @@ def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[Driver
     for location, value, plain in lengths:
         if not plain:
             continue
-        usual, which = math.nan, "the others"
+        typical, phrase = math.nan, "the others"
         if len(lengths) > TO_COMPARE:
-            usual = _median_of_others(in_order, value)
-        if value >= 1.0 and not is_thousandfold(value, usual):
+            typical = _median_of_others(in_order, value)
+        if value >= 1.0 and not is_thousandfold(value, typical):
             stated = _stated_lengths(source.data, mechanism) if stated is None else stated
-            usual, which = float(np.median(stated)) if stated else math.nan, "those with a unit"
-        if is_thousandfold(value, usual):
-            times = float(f"{value / usual:.1g}")
-            _warn(source, location, f"{value:g} m is {times:g} times {which}: {value:g} mm?")
+            typical, phrase = float(np.median(stated)) if stated else math.nan, "those with a unit"
+        if is_thousandfold(value, typical):
+            times = float(f"{value / typical:.1g}")
+            _warn(source, location, f"{value:g} m is {times:g} times {phrase}: {value:g} mm?")
     if all_lengths := (_stated_lengths(source.data, mechanism) if stated is None else stated) or in_order:
         _warn_of_length_laws(source, mechanism, float(np.median(all_lengths)))
     if len(lengths) < TO_COMPARE or in_order[-1] < LARGE or not all(plain for *_, plain in lengths):
         return
-    if (why := _too_large(mechanism, in_order[-1], laws)) and not _stated_lengths(source.data, mechanism):
+    if (doubt := _too_large(mechanism, in_order[-1], laws)) and not _stated_lengths(source.data, mechanism):
         location = max(lengths, key=lambda x: x[1])[0]
-        _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {why}: millimeters?")
+        _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {doubt}: millimeters?")
 
 
 def _too_large(mechanism: Mechanism, size: float, laws: Iterable[DriverLaw]) -> str:
@@ -256,9 +256,9 @@ def _too_large(mechanism: Mechanism, size: float, laws: Iterable[DriverLaw]) -> 
     for name, mass in masses.items():
         inertia = mechanism.bodies[name].inertia
         if inertia is not None:
-            most = float(np.abs(np.asarray(resolve(inertia, parameters), float)).max())
-            if 0 < most < SLENDER * float(resolve(mass, parameters)) * size**2:
-                return f"of a body with an inertia of {most:g} kg m^2"
+            largest = float(np.abs(np.asarray(resolve(inertia, parameters), float)).max())
+            if 0 < largest < SLENDER * float(resolve(mass, parameters)) * size**2:
+                return f"of a body with an inertia of {largest:g} kg m^2"
     return ""
 
 
@@ -280,23 +280,23 @@ def _stated_lengths(data: dict[str, Any], mechanism: Mechanism) -> list[float]:
 
 def _median_of_others(in_order: list[float], value: float) -> float:
     """Return the median of sorted numbers without one of them."""
-    own, count = bisect_left(in_order, value), len(in_order) - 1
-    low, high = (in_order[k + (k >= own)] for k in ((count - 1) // 2, count // 2))
+    index, count = bisect_left(in_order, value), len(in_order) - 1
+    low, high = (in_order[k + (k >= index)] for k in ((count - 1) // 2, count // 2))
     return (low + high) / 2
 
 
 def _warn(source: Source, location: Location, hint: str) -> None:
     line = source.line(location)
-    words = f"{source.path}, line {line}, {dotted(location)}: {hint} {IN_SI}"
-    warnings.warn(UnitWarning(words), stacklevel=4)
+    message = f"{source.path}, line {line}, {dotted(location)}: {hint} {IN_SI}"
+    warnings.warn(UnitWarning(message), stacklevel=4)
 
 
 def _fields(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, str, Any]]:
     """Yield the values of elements, bodies and outputs as the file gives them, with location and kind."""
     for section, role in ROLES.items():
         for name, given in (data.get(section) or {}).items():
-            own = "driver" if section == "joints" and is_cam(mechanism.space, given) else role
-            for key in file_keys(catalogue(mechanism.space, own)[given["type"]]):
+            element_role = "driver" if section == "joints" and is_cam(mechanism.space, given) else role
+            for key in file_keys(catalogue(mechanism.space, element_role)[given["type"]]):
                 quantity = at_coordinate(key.quantity, given.get("coordinate"))
                 yield from _leaves((section, name, key.key), quantity, given.get(key.key))
     for name, given in (data.get("bodies") or {}).items():

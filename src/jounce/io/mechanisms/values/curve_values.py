@@ -80,18 +80,18 @@ class _Reader:
         except JounceError as error:
             raise problem(error.message, *([error.name] if error.name else []), value=UNSET) from None
 
-    def _expressions(self, raw: object, info: Any, *at: str) -> tuple[Any, ...]:
+    def _expressions(self, raw: object, info: Any, *location: str) -> tuple[Any, ...]:
         if not isinstance(raw, list | tuple) or len(raw) != self.size:
-            words = f"must be {self.size} expressions of {' and '.join(self.names)}, one for each coordinate"
-            raise problem(words, *at, value=raw)
+            expectation = f"must be {self.size} expressions of {' and '.join(self.names)}, one for each coordinate"
+            raise problem(expectation, *location, value=raw)
         variables = dict.fromkeys(self.names)
-        return tuple(parse(x, "length", info, *at, k, variables=variables).value for k, x in enumerate(raw))
+        return tuple(parse(x, "length", info, *location, k, variables=variables).value for k, x in enumerate(raw))
 
 
-def _limits(raw: object, info: Any, *at: str | int) -> tuple[Any, ...]:
+def _limits(raw: object, info: Any, *location: str | int) -> tuple[Any, ...]:
     if not isinstance(raw, list | tuple) or len(raw) != 2:
-        raise problem("must be [first, last]", *at, value=raw)
-    return tuple(parse(x, "any", info, *at, k).value for k, x in enumerate(raw))
+        raise problem("must be [first, last]", *location, value=raw)
+    return tuple(parse(x, "any", info, *location, k).value for k, x in enumerate(raw))
 
 
 def _points(raw: dict[str, Any], closed: bool) -> CurvePoints:
@@ -105,16 +105,16 @@ def _points(raw: dict[str, Any], closed: bool) -> CurvePoints:
 
 def curve(names: tuple[str, ...], size: int) -> Any:
     """Return the annotation of a curve or a surface with given parameter names, in the plane or in space."""
-    words = f"expressions of {' and '.join(names)}, m, one for each coordinate in the frame of the first body"
-    whole = {"description": words, **list_schema({"anyOf": ANY_VALUE}, size)}
+    description = f"expressions of {' and '.join(names)}, m, one for each coordinate in the frame of the first body"
+    schema = {"description": description, **list_schema({"anyOf": ANY_VALUE}, size)}
     pair = list_schema({"anyOf": ANY_VALUE}, 2)
     flag = {"type": "boolean"}
     if len(names) > 1:
-        ranged = object_schema({"expressions": whole, "range": list_schema(pair, len(names))}, ("expressions",))
-        return Annotated[Any, Checked(_Reader(names, size), defined("surface", {"anyOf": [whole, ranged]}))]
-    ranged = object_schema({"expressions": whole, "range": pair, "closed": flag}, ("expressions",))
+        ranged = object_schema({"expressions": schema, "range": list_schema(pair, len(names))}, ("expressions",))
+        return Annotated[Any, Checked(_Reader(names, size), defined("surface", {"anyOf": [schema, ranged]}))]
+    ranged = object_schema({"expressions": schema, "range": pair, "closed": flag}, ("expressions",))
     degree = {"type": "integer", "minimum": 1, "maximum": 11}
     points = object_schema({"samples": {"type": "string"}, "closed": flag, "degree": degree}, ("samples",))
     of_cam = [object_schema({"cam": {"type": "string"}}, CAM_KEYS)] if size == 2 else []
     word = f"curve_of_{size}_coordinates"
-    return Annotated[Any, Checked(_Reader(names, size), defined(word, {"anyOf": [whole, ranged, points, *of_cam]}))]
+    return Annotated[Any, Checked(_Reader(names, size), defined(word, {"anyOf": [schema, ranged, points, *of_cam]}))]

@@ -21,14 +21,14 @@ from jounce.units.expression import Expression
 from jounce.units.values import Value, parse_value
 
 
-def problem(message: str, *at: str | int, value: object = ...) -> ValueError:
-    """Return an error for pydantic to collect; ``at`` is its location relative to the validated entry.
+def problem(message: str, *location: str | int, value: object = ...) -> ValueError:
+    """Return an error for pydantic to collect; `location` is relative to the validated entry.
 
     The error shows the value of the entry unless another value is given, and no value if that is ``UNSET``.
     """
     from pydantic_core import PydanticCustomError  # local, since its import takes a tenth of the time to the first name
 
-    return PydanticCustomError("jounce", "{message}", {"message": message, "at": at, "value": value})
+    return PydanticCustomError("jounce", "{message}", {"message": message, "at": location, "value": value})
 
 
 class Checked:
@@ -48,15 +48,15 @@ class Checked:
 
 
 def parse(
-    raw: object, quantity: str, info: Any, *at: str | int, variables: dict[str, Dimension | None] | None = None
+    raw: object, quantity: str, info: Any, *location: str | int, variables: dict[str, Dimension | None] | None = None
 ) -> Value:
-    """Return a value of a kind of ``dimensions.KINDS``; ``at`` is its location relative to the validated entry."""
+    """Return a value of a kind of ``dimensions.KINDS``; `location` is relative to the validated entry."""
     quantity = at_coordinate(quantity, info.data.get("coordinate"))
     context = info.context or {}
     try:
         value = parse_value(raw, quantity, context.get("names", ()), context.get("dimensions"), variables)
     except JounceError as error:
-        raise problem(error.message, *at, value=UNSET if shows_value(error) else raw) from None
+        raise problem(error.message, *location, value=UNSET if shows_value(error) else raw) from None
     _note_use(context.get("uses", {}), value.value, quantity)
     return value
 
@@ -102,8 +102,8 @@ def list_schema(items: dict[str, Any], size: int) -> dict[str, Any]:
 
 def object_schema(properties: dict[str, Any], required: Iterable[str] | None = None) -> dict[str, Any]:
     """Return the JSON Schema of a mapping without other keys; by default all keys are required."""
-    needed = list(properties if required is None else required)
-    return {"type": "object", "properties": properties, "required": needed, "additionalProperties": False}
+    keys = list(properties if required is None else required)
+    return {"type": "object", "properties": properties, "required": keys, "additionalProperties": False}
 
 
 def scalar(quantity: str) -> Any:
@@ -123,24 +123,26 @@ def scalars(count: int, quantity: str) -> Any:
     return Annotated[Any, Checked(check, schema)]
 
 
-def vector_value(raw: object, size: int, quantity: str, info: Any, *at: str | int) -> tuple[float | Expression, ...]:
+def vector_value(
+    raw: object, size: int, quantity: str, info: Any, *location: str | int
+) -> tuple[float | Expression, ...]:
     """Return a list of values of one kind, after a check."""
     if not isinstance(raw, (list, tuple)) or len(raw) != size:
-        raise problem(f"must be a list of {size} values", *at, value=raw)
+        raise problem(f"must be a list of {size} values", *location, value=raw)
     kind = "any" if quantity == "direction" else quantity
-    parsed = [parse(item, kind, info, *at, index) for index, item in enumerate(raw)]
+    parsed = [parse(item, kind, info, *location, index) for index, item in enumerate(raw)]
     if quantity == "direction":
-        used = {item.dimension for item in parsed if item.value != 0 and isinstance(item.value, float)}
+        dimensions = {item.dimension for item in parsed if item.value != 0 and isinstance(item.value, float)}
         stated = {item.dimension for item in parsed} - {None}
-        if len(used) > 1 or len(stated) > 1:
-            raise problem("the components of a direction must all have the same unit, or none", *at, value=raw)
+        if len(dimensions) > 1 or len(stated) > 1:
+            raise problem("the components of a direction must all have the same unit, or none", *location, value=raw)
     return tuple(item.value for item in parsed)
 
 
 def vector_schema(size: int, quantity: str) -> dict[str, Any]:
     """Return the JSON Schema of a list of values of one kind."""
-    words = "a direction, of any length but zero" if quantity == "direction" else _words(quantity)
-    return {"description": words} | list_schema({"anyOf": ANY_VALUE}, size)
+    description = "a direction, of any length but zero" if quantity == "direction" else _words(quantity)
+    return {"description": description} | list_schema({"anyOf": ANY_VALUE}, size)
 
 
 def vector(size: int, quantity: str) -> Any:
@@ -180,18 +182,18 @@ def parts(kinds: dict[str, str], size: int) -> Any:
 def nested(kind: type[Any]) -> Any:
     """Return the annotation of a mapping of the scalar fields of a class, which is converted to an instance."""
     fields, quantities = value_fields(kind), facts_of(kind).dimensions
-    needed = [name for name, field in fields.items() if field.default is MISSING]
-    words = f"{{{', '.join(f'{name}: ...' for name in needed)}}}"
+    required = [name for name, field in fields.items() if field.default is MISSING]
+    example = f"{{{', '.join(f'{name}: ...' for name in required)}}}"
 
     def check(raw: object, info: Any) -> Any:
         if not isinstance(raw, dict):
-            raise problem(f"must be a mapping, as {words}")
+            raise problem(f"must be a mapping, as {example}")
         for name in raw:
             if name not in fields:
                 raise problem(no_such("key", name, fields), value=name)
-        for name in needed:
+        for name in required:
             if raw.get(name) is None:
-                raise problem(f"is missing: give {words}", name, value=UNSET)
+                raise problem(f"is missing: give {example}", name, value=UNSET)
         given = {name: x for name, x in raw.items() if x is not None}
         parsed = {name: parse(x, quantities[name], info, name).value for name, x in given.items()}
         try:
@@ -199,7 +201,7 @@ def nested(kind: type[Any]) -> Any:
         except MechanismError as error:
             raise problem(error.message, error.name or "", value=UNSET) from None
 
-    return Annotated[Any, Checked(check, object_schema({n: scalar_schema(quantities[n]) for n in fields}, needed))]
+    return Annotated[Any, Checked(check, object_schema({n: scalar_schema(quantities[n]) for n in fields}, required))]
 
 
 def points(size: int, quantity: str) -> Any:

@@ -41,13 +41,13 @@ def inertia(space: str) -> Any:
     forms = [*_solid_schemas(), _pseudo_schema(3 if planar else 4)]
     solid = "a solid such as {solid: rod, length: 20 cm}"
     if planar:
-        plain = scalar_schema("inertia")
-        schema = {"description": f"{plain['description']}; or {solid}", "anyOf": [*plain["anyOf"], *forms]}
+        single = scalar_schema("inertia")
+        schema = {"description": f"{single['description']}; or {solid}", "anyOf": [*single["anyOf"], *forms]}
     else:
         rows = vector_schema(3, "inertia")
         matrix = list_schema(rows, 3)
-        words = f"a list of 3 principal moments, or 3 rows of 3, such as 0.1 kg*m^2; or {solid}"
-        schema = {"description": words, "anyOf": [rows, matrix, *forms]}
+        description = f"a list of 3 principal moments, or 3 rows of 3, such as 0.1 kg*m^2; or {solid}"
+        schema = {"description": description, "anyOf": [rows, matrix, *forms]}
     return Annotated[Any, Checked(check, schema)]
 
 

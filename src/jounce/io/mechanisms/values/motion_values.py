@@ -92,7 +92,7 @@ FORMS = {
 
 def cam_motion(quantity: str) -> Any:
     """Return the annotation of the law of a cam, a function of the coordinate of a driver, a joint or an output."""
-    plain: Checked = motion(quantity).__metadata__[0]
+    single: Checked = motion(quantity).__metadata__[0]
 
     def check(raw: object, info: Any) -> Any:
         if not isinstance(raw, dict) or raw.get("of") is None:
@@ -102,9 +102,9 @@ def cam_motion(quantity: str) -> Any:
         if "output" in raw:
             raise problem("a cam states its own law; only a driver may follow from an output", "output", value=UNSET)
         context = info.context or {}
-        return plain.function(raw, SimpleNamespace(context={**context, "drivers": context["leaders"]}, data=info.data))
+        return single.function(raw, SimpleNamespace(context={**context, "drivers": context["leaders"]}, data=info.data))
 
-    return Annotated[Any, Checked(check, plain.schema)]
+    return Annotated[Any, Checked(check, single.schema)]
 
 
 def motion(quantity: str, variables: dict[str, Dimension | None] | None = None, *, free: bool = False) -> Any:
@@ -183,14 +183,14 @@ def _output_law(raw: dict[str, Any], info: Any, variables: dict[str, Dimension |
     return OutputLaw(name, _below(single, raw["law"], info, "law"))
 
 
-def _below(single: Checked, raw: object, info: Any, at: str | int) -> Any:
-    """Return the checked value of a nested entry; errors are located at `at`."""
+def _below(single: Checked, raw: object, info: Any, location: str | int) -> Any:
+    """Return the checked value of a nested entry; errors are located at `location`."""
     try:
         return single.function(raw, info)
     except PydanticCustomError as error:
         context = error.context or {}
         value = raw if context["value"] is ... else context["value"]
-        raise problem(context["message"], at, *context["at"], value=value) from None
+        raise problem(context["message"], location, *context["at"], value=value) from None
 
 
 def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
@@ -198,11 +198,11 @@ def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
     for key in ("samples", "time", "value"):
         if key in raw and not isinstance(raw[key], str):
             raise problem("must be a name", key, value=raw[key])
-    whole = {"degree": "the degree of a spline", "derivative": "0 is the value itself, 2 the acceleration"}
-    for (key, words), (least, most) in zip(whole.items(), ((1, HIGHEST_DEGREE), (0, MOST)), strict=True):
-        value = raw.get(key, least)
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise problem(f"must be a whole number from {least} to {most}; {words}", key, value=value)
+    whole_numbers = {"degree": "the degree of a spline", "derivative": "0 is the value itself, 2 the acceleration"}
+    for (key, phrase), (low, high) in zip(whole_numbers.items(), ((1, HIGHEST_DEGREE), (0, MOST)), strict=True):
+        value = raw.get(key, low)
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise problem(f"must be a whole number from {low} to {high}; {phrase}", key, value=value)
     derivative, initial, beyond = raw.get("derivative", 0), raw.get("initial", []), raw.get("beyond", WAYS[0])
     if beyond not in WAYS:
         raise problem(unknown("way", beyond, WAYS), "beyond", value=beyond)
@@ -219,8 +219,8 @@ def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
 
 def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> Any:
     """Return the annotation of a list of laws, one for each component of a force."""
-    one = motion(quantity, variables)
-    single: Checked = one.__metadata__[0]
+    element = motion(quantity, variables)
+    single: Checked = element.__metadata__[0]
 
     def check(raw: object, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) != size:

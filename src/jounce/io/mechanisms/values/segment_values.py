@@ -64,13 +64,13 @@ def leader(raw: dict[str, Any], info: Any) -> str | Expression | None:
     if given in names:
         return given
     if names is context.get("leaders", ...):
-        words = no_such("leader", given, names, "coordinate")
-        raise problem(f"must be the name of a driver, a joint, or an output; {words}", "of", value=given)
+        message = no_such("leader", given, names, "coordinate")
+        raise problem(f"must be the name of a driver, a joint, or an output; {message}", "of", value=given)
     if given in context.get("leaders", ()) and given not in context.get("names", ()):
-        words = (
+        message = (
             "is not a driver, and only a cam, which is a joint, follows what is not driven; write this law under joints"
         )
-        raise problem(words, "of", value=given)
+        raise problem(message, "of", value=given)
     value = parse(given, "any", info, "of", variables={"t": None}).value
     if not isinstance(value, Expression):
         raise problem("must be the name of a driver, or an expression of t", "of", value=given)
@@ -87,10 +87,10 @@ def followed_law(law: Any, by: str | Expression | None) -> Any:
 
 def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion | UnresolvedFollower:
     """Return the law of a profile of segments."""
-    entries, by = raw["profile"], leader(raw, info)
+    entries, leader_value = raw["profile"], leader(raw, info)
     if not isinstance(entries, list | tuple) or not entries:
         raise problem("must be a list of segments, such as {profile: cycloidal, duration: 1 s, to: 20 mm}", "profile")
-    lapse, level = _independent_variable(by, info), order_of(raw)
+    lapse, level = _independent_variable(leader_value, info), order_of(raw)
     segments = [_segment(entry, k, quantity, lapse, level, info) for k, entry in enumerate(entries)]
     initials = initial_values(raw, level + 1, quantity, lapse, info) if level else []
     if level:
@@ -103,7 +103,7 @@ def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion |
         raise problem(unknown("way", beyond, BEYOND), "beyond", value=beyond)
     try:
         law: AbstractMotion = SegmentedMotion(segments, initial, start, beyond)
-        return followed_law(IntegratedMotion(law, level, initials, start) if level else law, by)
+        return followed_law(IntegratedMotion(law, level, initials, start) if level else law, leader_value)
     except TrajectoryError as error:
         raise problem(error.message, *_place(error.name), value=UNSET if error.value is None else error.value) from None
 
@@ -112,17 +112,17 @@ def order_of(raw: dict[str, Any]) -> int:
     """Return the order of the derivative that a law gives; 0 for the law itself."""
     level = raw.get("derivative", 0)
     if isinstance(level, bool) or not isinstance(level, int) or not 0 <= level <= HIGHEST:
-        words = f"must be a whole number from 0 to {HIGHEST}; 0 is the value itself, 1 the velocity"
-        raise problem(words, "derivative", value=level)
+        message = f"must be a whole number from 0 to {HIGHEST}; 0 is the value itself, 1 the velocity"
+        raise problem(message, "derivative", value=level)
     return level
 
 
-def initial_values(raw: dict[str, Any], most: int, quantity: str, lapse: str, info: Any) -> list[Any]:
+def initial_values(raw: dict[str, Any], limit: int, quantity: str, lapse: str, info: Any) -> list[Any]:
     """Return the initial values of a law that is given by a derivative, lowest order first."""
     given = raw.get("initial", [])
-    if not isinstance(given, list | tuple) or len(given) > most:
-        words = f"must be a list of at most {most} values: the law and its derivatives below the one that is given"
-        raise problem(words, "initial", value=given)
+    if not isinstance(given, list | tuple) or len(given) > limit:
+        message = f"must be a list of at most {limit} values: the law and its derivatives below the one that is given"
+        raise problem(message, "initial", value=given)
     return [rate(x, order, quantity, info, "initial", order, by=lapse) for order, x in enumerate(given)]
 
 
@@ -148,16 +148,16 @@ def expressed(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
     """Return the law of an expression, of time or the coordinate of a driver, integrated if it is a derivative."""
     for key in ("beyond", "until"):
         if key in raw:
-            words = "an expression has no end; write it as a piece: piecewise: [{until: ..., expression: ...}]"
-            raise problem(words, key, value=UNSET)
+            message = "an expression has no end; write it as a piece: piecewise: [{until: ..., expression: ...}]"
+            raise problem(message, key, value=UNSET)
     if set(variables) != {"t"} and len(raw) > 1:
         raise problem("is for laws of t only", next(key for key in raw if key != "expression"), value=UNSET)
-    by = leader(raw, info)
-    lapse = _independent_variable(by, info)
-    if by is not None:
+    leader_value = leader(raw, info)
+    lapse = _independent_variable(leader_value, info)
+    if leader_value is not None:
         variables = {"t": _DIMENSIONS.get(lapse)}
     law = _rate_law(raw["expression"], order_of(raw), quantity, info, "expression", by=lapse, variables=variables)
-    return followed_law(_integrated(law, raw, quantity, lapse, info), by)
+    return followed_law(_integrated(law, raw, quantity, lapse, info), leader_value)
 
 
 def _rate_law(
@@ -165,14 +165,14 @@ def _rate_law(
     order: int,
     quantity: str,
     info: Any,
-    *at: str | int,
+    *location: str | int,
     by: str,
     variables: dict[str, Dimension | None],
 ) -> Any:
     """Return an expression of t for a driven quantity, or for its derivative of some order."""
     if not order:
-        return parse(raw, quantity, info, *at, variables=variables).value
-    return rate(raw, order, quantity, info, *at, by=by, variables=variables)
+        return parse(raw, quantity, info, *location, variables=variables).value
+    return rate(raw, order, quantity, info, *location, by=by, variables=variables)
 
 
 def _place(name: str | None) -> tuple[str | int, ...]:
@@ -184,24 +184,24 @@ def _place(name: str | None) -> tuple[str | int, ...]:
     return ("profile", *([int(number)] if number else []), *([key] if key else []))
 
 
-def _independent_variable(by: str | Expression | None, info: Any) -> str:
+def _independent_variable(leader_value: str | Expression | None, info: Any) -> str:
     """Return the kind of the variable of a law: time, or that of a cam or of the coordinate of a driver."""
     context = info.context or {}
-    if by is None:
+    if leader_value is None:
         return context.get("lapse", "time")
-    return context["drivers"][by] if isinstance(by, str) else "any"
+    return context["drivers"][leader_value] if isinstance(leader_value, str) else "any"
 
 
 def _segment(entry: object, k: int, quantity: str, lapse: str, level: int, info: Any) -> Segment:
     if not isinstance(entry, dict):
         raise problem("must be a segment, such as {profile: dwell, duration: 1 s}", "profile", k, value=entry)
     for key in entry.keys() - set(SEGMENT_KEYS):
-        words = unknown(f"key {show_value(key)}", key, SEGMENT_KEYS)
-        raise problem(words, "profile", k, key, value=UNSET)
+        message = unknown(f"key {show_value(key)}", key, SEGMENT_KEYS)
+        raise problem(message, "profile", k, key, value=UNSET)
     profile = entry.get("profile")
     if not isinstance(profile, str) or profile not in SEGMENT_PROFILES:
-        words = unknown("profile", profile, SEGMENT_PROFILES) if isinstance(profile, str) else "is missing"
-        raise problem(words, "profile", k, "profile", value=UNSET if profile is None else profile)
+        message = unknown("profile", profile, SEGMENT_PROFILES) if isinstance(profile, str) else "is missing"
+        raise problem(message, "profile", k, "profile", value=UNSET if profile is None else profile)
     values: dict[str, Any] = {"profile": profile}
     if "duration" in entry:
         values["duration"] = parse(entry["duration"], lapse, info, "profile", k, "duration").value
@@ -219,24 +219,24 @@ def _segment(entry: object, k: int, quantity: str, lapse: str, level: int, info:
 
 def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str, Dimension | None]) -> Any:
     """Return the law of consecutive expressions."""
-    entries, by, level = raw["piecewise"], leader(raw, info), order_of(raw)
+    entries, leader_value, level = raw["piecewise"], leader(raw, info), order_of(raw)
     if not isinstance(entries, list | tuple) or not entries:
         raise problem("must be a list such as [{until: 1 s, expression: t**2}, {expression: 1}]", "piecewise")
     if set(variables) != {"t"}:
         raise problem("a law of other variables than t is given by one expression", "piecewise", value=UNSET)
-    lapse = _independent_variable(by, info)
-    if by is not None:
+    lapse = _independent_variable(leader_value, info)
+    if leader_value is not None:
         variables = {"t": _DIMENSIONS.get(lapse)}
     laws, ends = [], []
     for k, entry in enumerate(entries):
         last = k + 1 == len(entries)
         valid = ({"expression", "until"}, {"expression"}) if last else ({"expression", "until"},)
         if not isinstance(entry, dict) or entry.keys() not in valid:
-            words = "must have the keys expression and until" if not last else "must have the key expression"
+            message = "must have the keys expression and until" if not last else "must have the key expression"
             advice = "; where the last piece ends may be left out" if not last else ", and may say until when it goes"
-            raise problem(words + advice, "piecewise", k, value=entry)
-        at = ("piecewise", k, "expression")
-        law = _rate_law(entry["expression"], level, quantity, info, *at, by=lapse, variables=variables)
+            raise problem(message + advice, "piecewise", k, value=entry)
+        location = ("piecewise", k, "expression")
+        law = _rate_law(entry["expression"], level, quantity, info, *location, by=lapse, variables=variables)
         laws.append(law if isinstance(law, Expression) else Expression(repr(law)))
         if "until" in entry:
             ends.append(parse(entry["until"], lapse, info, "piecewise", k, "until").value)
@@ -247,16 +247,16 @@ def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
     if len(ends) < len(laws):
         for key in ("beyond", "start"):
             if key in raw and not (key == "start" and level):
-                words = "the last piece has no end, so that nothing lies beyond it; give until when it is valid"
-                raise problem(words, key, value=UNSET)
+                message = "the last piece has no end, so that nothing lies beyond it; give until when it is valid"
+                raise problem(message, key, value=UNSET)
     try:
         law = PiecewiseMotion(laws, ends, start if len(ends) == len(laws) else None, beyond)
     except TrajectoryError as error:
         key = str(error.name).partition("[")[0]
         number = str(error.name)[len(key) + 1 : -1]
-        at = ("piecewise", int(number), key) if number else ("start",) if key == "start" else ("piecewise",)
-        raise problem(error.message, *at, value=UNSET if error.value is None else error.value) from None
-    return followed_law(_integrated(law, raw, quantity, lapse, info, 0.0 if start is None else start), by)
+        location = ("piecewise", int(number), key) if number else ("start",) if key == "start" else ("piecewise",)
+        raise problem(error.message, *location, value=UNSET if error.value is None else error.value) from None
+    return followed_law(_integrated(law, raw, quantity, lapse, info, 0.0 if start is None else start), leader_value)
 
 
 def rate(
@@ -264,17 +264,17 @@ def rate(
     order: int,
     quantity: str,
     info: Any,
-    *at: str | int,
+    *location: str | int,
     by: str = "time",
     variables: dict[str, Dimension | None] | None = None,
 ) -> float | Expression:
     """Return a derivative of a driven quantity with respect to the variable of its law, in SI units."""
-    value = parse(raw, quantity if order == 0 else "any", info, *at, variables=variables)
+    value = parse(raw, quantity if order == 0 else "any", info, *location, variables=variables)
     if order and value.dimension:
         quantities, lapses = bases(quantity, info), [by] if by in LAPSES else LAPSES
         if not any(is_rate(value.dimension, quantities, order, lapse) for lapse in lapses):
             per = " or".join(per_power(order, LAPSES[lapse]) for lapse in lapses)
-            raise problem(f"must be {' or '.join(quantities) or 'a number'}{per}", *at, value=raw)
+            raise problem(f"must be {' or '.join(quantities) or 'a number'}{per}", *location, value=raw)
     return value.value
 
 
@@ -295,7 +295,7 @@ def segmented_schema() -> dict[str, Any]:
         "end": rates,
         "limits": list_schema(value, 3),
     }
-    whole = {
+    schema = {
         "profile": {"type": "array", "items": object_schema(segment, ["profile"]), "minItems": 1},
         "initial": value,
         "start": value,
@@ -303,15 +303,15 @@ def segmented_schema() -> dict[str, Any]:
         "of": LEADER_SCHEMA,
         "derivative": DERIVATIVE_SCHEMA,
     }
-    whole["initial"] = {"anyOf": [*ANY_VALUE, INITIAL_SCHEMA]}
-    return defined("segmented_law", object_schema(whole, ["profile"]))
+    schema["initial"] = {"anyOf": [*ANY_VALUE, INITIAL_SCHEMA]}
+    return defined("segmented_law", object_schema(schema, ["profile"]))
 
 
 def piecewise_schema(law: dict[str, Any]) -> dict[str, Any]:
     """Return the JSON Schema of consecutive expressions; `law` is that of one expression."""
     value = {"anyOf": ANY_VALUE}
     piece = object_schema({"expression": law, "until": value}, ["expression"])
-    whole = {
+    schema = {
         "piecewise": {"type": "array", "items": piece, "minItems": 1},
         "start": value,
         "beyond": {"enum": list(BEYOND_PIECES)},
@@ -319,10 +319,10 @@ def piecewise_schema(law: dict[str, Any]) -> dict[str, Any]:
         "derivative": DERIVATIVE_SCHEMA,
         "initial": INITIAL_SCHEMA,
     }
-    return object_schema(whole, ["piecewise"])
+    return object_schema(schema, ["piecewise"])
 
 
 def expression_schema(law: dict[str, Any]) -> dict[str, Any]:
     """Return the JSON Schema of a law by one expression; `law` is that of the expression."""
-    rest = {"of": LEADER_SCHEMA, "derivative": DERIVATIVE_SCHEMA, "initial": INITIAL_SCHEMA}
-    return object_schema({"expression": law, **rest, "start": {"anyOf": ANY_VALUE}}, ["expression"])
+    options = {"of": LEADER_SCHEMA, "derivative": DERIVATIVE_SCHEMA, "initial": INITIAL_SCHEMA}
+    return object_schema({"expression": law, **options, "start": {"anyOf": ANY_VALUE}}, ["expression"])

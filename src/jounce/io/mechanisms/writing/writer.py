@@ -167,11 +167,11 @@ class _Writer:
         if isinstance(element, Cam):
             return self._cam(f"{section}.{name}", element)
         location, kind = f"{section}.{name}", type(element)
-        named = catalogue(self.mechanism.space, ROLES[section]).get(kind.type_name)
-        if named is not kind:
+        class_of_type = catalogue(self.mechanism.space, ROLES[section]).get(kind.type_name)
+        if class_of_type is not kind:
             message = f"the class {kind.__name__} has no type by which a file could name it"
-            if named is not None:
-                other = f"{named.__qualname__} of {named.__module__}"
+            if class_of_type is not None:
+                other = f"{class_of_type.__qualname__} of {class_of_type.__module__}"
                 message = f"the type {kind.type_name!r} names another class, {other}; give that one another type"
             raise MechanismError(message, name=location)
         entries: dict[str, Any] = {"type": kind.type_name}
@@ -193,8 +193,8 @@ class _Writer:
 
     def _output(self, name: str, output: Any) -> dict[str, Any]:
         location, kind = f"outputs.{name}", form_of(output)
-        words = [word for word, output_class in OUTPUTS if output_class is kind]
-        if not words:
+        names = [word for word, output_class in OUTPUTS if output_class is kind]
+        if not names:
             raise MechanismError(f"the output {kind.__name__} has no form in a file", name=location)
         holder = output_holder(kind)
         entries: dict[str, Any] = {}
@@ -205,8 +205,8 @@ class _Writer:
         values = self._values(location, output, kind)
         if holder in values:
             entries[holder] = values.pop(holder)
-        if words[-1] is not None:  # a joint has two words; reaction rather than force
-            entries["quantity"] = words[-1]
+        if names[-1] is not None:  # a joint has two words; reaction rather than force
+            entries["quantity"] = names[-1]
         return entries | values
 
     def _values(self, location: str, element: Any, kind: type[Any] | None = None) -> dict[str, Any]:
@@ -218,17 +218,17 @@ class _Writer:
             values = [getattr(element, field) for field in key.fields]
             if not key.required and all(_is_default(x, fields[f]) for x, f in zip(values, key.fields, strict=True)):
                 continue
-            where = f"{location}.{key.key}"
+            place = f"{location}.{key.key}"
             if key.kind in ("motion", "law", "laws"):
-                written: list[Any] = [self.laws.written(where, x, element) for x in values]
+                written: list[Any] = [self.laws.written(place, x, element) for x in values]
             elif key.kind == "curve":
-                written = [self.laws.curve(where, x) for x in values]
+                written = [self.laws.curve(place, x) for x in values]
             elif key.kind == "nested":
-                written = [self._values(where, x) for x in values]
+                written = [self._values(place, x) for x in values]
             else:
-                written = [plain(value, where) for value in values]
-            whole = dict(zip(key.names, written, strict=True)) if key.names else written
-            entries[key.key] = written[0] if len(written) == 1 else whole
+                written = [plain(value, place) for value in values]
+            result = dict(zip(key.names, written, strict=True)) if key.names else written
+            entries[key.key] = written[0] if len(written) == 1 else result
         return entries
 
 

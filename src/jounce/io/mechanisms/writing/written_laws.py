@@ -169,8 +169,8 @@ def _segmented(location: str, law: SegmentedMotion) -> dict[str, Any]:
     for segment in segments:
         given = {field.name: getattr(segment, field.name) for field in dataclasses.fields(segment)}
         entries.append({key: plain(x, location) for key, x in given.items() if x is not None})
-    rest = {"initial": (initial, 0.0), "start": (start, 0.0), "beyond": (beyond, "hold")}
-    return {"profile": entries} | {key: plain(x, location) for key, (x, usual) in rest.items() if x != usual}
+    options = {"initial": (initial, 0.0), "start": (start, 0.0), "beyond": (beyond, "hold")}
+    return {"profile": entries} | {key: plain(x, location) for key, (x, default) in options.items() if x != default}
 
 
 def _piecewise(location: str, law: PiecewiseMotion) -> dict[str, Any]:
@@ -195,13 +195,13 @@ def _samples_of(law: SplineMotion) -> tuple[Any, Any]:
     """Return samples that determine the spline of a law by its degree and breakpoints."""
     ends = np.asarray(law.breakpoints, float)
     pieces = np.asarray(law.coefficients, float)
-    between = (law.degree - 1) // 2  # samples within each end interval, which are no breakpoints
+    inside = (law.degree - 1) // 2  # samples within each end interval, which are no breakpoints
     last = float(law.stop)
     if last <= ends[-1]:  # the last piece is at rest, without an end
-        last = ends[-1] + ((between + 1) * (ends[-1] - ends[0]) / (len(ends) + between) if len(ends) > 1 else 1.0)
+        last = ends[-1] + ((inside + 1) * (ends[-1] - ends[0]) / (len(ends) + inside) if len(ends) > 1 else 1.0)
     times = np.unique(np.concatenate([
-        np.linspace(ends[0], ends[1] if len(ends) > 1 else last, between + 2),
-        ends, np.linspace(ends[-1], last, between + 2),
+        np.linspace(ends[0], ends[1] if len(ends) > 1 else last, inside + 2),
+        ends, np.linspace(ends[-1], last, inside + 2),
     ]))  # fmt: skip
     if len(ends) == 1:
         times = np.linspace(ends[0], last, law.degree + 1)

@@ -34,5 +34,5 @@ def plain_number(value: float, location: str) -> float | int:
     """Return a finite number, as an int if it is an integer."""
     if not math.isfinite(value):
         raise MechanismError("must be finite", name=location, value=value)
-    whole = value.is_integer() and abs(value) < 1e9 and math.copysign(1.0, value) == (1.0 if value >= 0 else -1.0)
-    return int(value) if whole else value
+    is_whole = value.is_integer() and abs(value) < 1e9 and math.copysign(1.0, value) == (1.0 if value >= 0 else -1.0)
+    return int(value) if is_whole else value

@@ -115,7 +115,7 @@ class Faults:
         return RobotWarning(f"{self.path}: {'; '.join(parts)}; {advice} with strict=True (--strict)")
 
 
-def _listed(noted: Iterable[str], most: int) -> str:
-    names = list(noted)
-    more = len(names) - most
-    return ", ".join(names if more <= 0 else [*names[:most], f"and {more} more"])
+def _listed(texts: Iterable[str], limit: int) -> str:
+    names = list(texts)
+    excess = len(names) - limit
+    return ", ".join(names if excess <= 0 else [*names[:limit], f"and {excess} more"])

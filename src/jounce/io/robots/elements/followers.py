@@ -41,29 +41,29 @@ def with_room(
         If an ignored range is an error.
     """
     by_name = {joint.name: joint for joint in joints}
-    following: dict[str, list[Joint]] = {}
+    followers_of: dict[str, list[Joint]] = {}
     for joint in joints:
         ranged = (joint.limits.lower, joint.limits.upper) != (None, None)
         if joint.moving and joint.mimic and ranged and not joint.mimic.several and joint.mimic.multiplier:
-            following.setdefault(joint.mimic.joint, []).append(joint)
+            followers_of.setdefault(joint.mimic.joint, []).append(joint)
     for leader in joints:
-        followers = following.get(leader.name, [])
+        followers = followers_of.get(leader.name, [])
         if not followers or leader.name in fixed or has_room(leader.limits, followers):
             continue
-        bad = {joint.name for joint in followers if not has_room(leader.limits, [joint])}
-        rest = [joint for joint in followers if joint.name not in bad]
+        rejected = {joint.name for joint in followers if not has_room(leader.limits, [joint])}
+        rest = [joint for joint in followers if joint.name not in rejected]
         narrowing = _narrowing(leader, rest)
         for joint in followers:
-            suits = joint.name not in bad
-            other_joints = [x for x in narrowing if x is not joint] if suits else []
+            fits = joint.name not in rejected
+            other_joints = [x for x in narrowing if x is not joint] if fits else []
             conflicting = [x.name for x in other_joints if not has_room(leader.limits, [joint, x])]
-            if suits and not conflicting:
+            if fits and not conflicting:
                 continue
             own, (low, high) = ranges_at_leader(leader.limits, [joint])
-            against = f" beside {', '.join(conflicting)}" if conflicting else ""
+            conflict = f" beside {', '.join(conflicting)}" if conflicting else ""
             message = (
                 f"its range leaves {leader.name}, which it follows, {low:.6g} to {high:.6g} of "
-                f"{own[0]:.6g} to {own[1]:.6g}{against}: no room to move; correct the limits or the multiplier, "
+                f"{own[0]:.6g} to {own[1]:.6g}{conflict}: no room to move; correct the limits or the multiplier, "
                 "or read the file without strict"
             )
             error = RobotError(message, name=f"joints.{joint.name}.limit")

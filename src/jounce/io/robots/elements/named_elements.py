@@ -32,5 +32,5 @@ class NamedElements:
         while name and name not in self.elements:
             name = name.rpartition(".")[0]
         element = self.elements.get(name, self.root)
-        shown = None if error.name is None else ascii(error.name)[1:-1]
-        return RobotFileError(error.message, path=element.path, line=element.line, name=shown, value=error.value)
+        label = None if error.name is None else ascii(error.name)[1:-1]
+        return RobotFileError(error.message, path=element.path, line=element.line, name=label, value=error.value)

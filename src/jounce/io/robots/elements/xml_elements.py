@@ -48,8 +48,8 @@ class Element:
         """
         elements = self.every(tag)
         if len(elements) > 1:
-            shown = ".".join(name) or f"<{self.tag}>"
-            elements[1].leave_out(TWICE, shown, f"<{tag}> is given twice, first in line {elements[0].line}", *name)
+            label = ".".join(name) or f"<{self.tag}>"
+            elements[1].leave_out(TWICE, label, f"<{tag}> is given twice, first in line {elements[0].line}", *name)
         return elements[0] if elements else None
 
     def every(self, tag: str) -> list[Element]:
@@ -58,11 +58,11 @@ class Element:
 
     def walk(self) -> Iterator[Element]:
         """Yield the element and all its descendants, in the order of the file."""
-        waiting: list[Element] = [self]
-        while waiting:
-            element = waiting.pop()
+        pending: list[Element] = [self]
+        while pending:
+            element = pending.pop()
             yield element
-            waiting.extend(reversed(element.children))
+            pending.extend(reversed(element.children))
 
     def error(self, message: str, *name: str, **value: Any) -> RobotFileError:
         """Return an error at the line of the element, about an entry whose name is given in steps."""
@@ -95,7 +95,7 @@ class Element:
         """Return the finite numbers in the text of the element."""
         return self._parsed(self.content.strip(), f"<{self.tag}> must hold", count, name, infinite)
 
-    def _parsed(self, text: str, words: str, count: int, name: tuple[str, ...], infinite: bool) -> list[float]:
+    def _parsed(self, text: str, phrase: str, count: int, name: tuple[str, ...], infinite: bool) -> list[float]:
         expected = "a finite number" if count == 1 else f"{count} finite numbers"
         try:
             values = [float(word) for word in text.split()]
@@ -103,10 +103,10 @@ class Element:
             values = []
         usable = infinite or not any(map(fault_of_number, values))
         if len(values) != count or not usable or any(map(math.isnan, values)) or "_" in text:
-            most = (
+            maximum = (
                 f" of at most {LARGEST_NUMBER:g}" if values and all(map(math.isfinite, values)) and not usable else ""
             )
-            raise self.error(f"{words} {expected}{most}", *name, value=text)
+            raise self.error(f"{phrase} {expected}{maximum}", *name, value=text)
         return values
 
     def check_children(self, known: Iterable[str], *name: str) -> None:
@@ -119,9 +119,9 @@ class Element:
         """
         valid = set(known)
         for child in self.children:
-            near = "" if child.tag in valid else did_you_mean(child.tag, valid, limit=0)
-            if near and abs(len(child.tag) - len(near.split("'")[1])) <= 1:
-                child.leave_out_unknown(f"unknown element; {near}", *name)
+            suggestion = "" if child.tag in valid else did_you_mean(child.tag, valid, limit=0)
+            if suggestion and abs(len(child.tag) - len(suggestion.split("'")[1])) <= 1:
+                child.leave_out_unknown(f"unknown element; {suggestion}", *name)
 
     def leave_out_unknown(self, message: str, *name: str) -> None:
         """Record the element as one that its format does not have.
@@ -131,10 +131,10 @@ class Element:
         RobotFileError
             If faults are errors.
         """
-        shown = f"<{self.tag}> of {name[1]}" if len(name) > 1 else f"<{self.tag}>"
-        self.leave_out(UNKNOWN, shown, message, *name)
+        label = f"<{self.tag}> of {name[1]}" if len(name) > 1 else f"<{self.tag}>"
+        self.leave_out(UNKNOWN, label, message, *name)
 
-    def leave_out(self, heading: str, shown: str, message: str, *name: str) -> None:
+    def leave_out(self, heading: str, label: str, message: str, *name: str) -> None:
         """Record under a heading that the element is left out.
 
         Raises
@@ -145,7 +145,7 @@ class Element:
         error = self.error(message, *name, value=f"<{self.tag}>")
         if self.faults is None:
             raise error
-        self.faults.leave_out(heading, shown, error)
+        self.faults.leave_out(heading, label, error)
 
 
 def read_markup(path: str, faults: Faults | None = None) -> Element:
@@ -175,12 +175,12 @@ def read_markup(path: str, faults: Faults | None = None) -> Element:
     content = read_file(path, error=RobotFileError)
     if not content.strip():
         raise RobotFileError("the file is empty", path=path)
-    wide = content.startswith((b"\xff\xfe", b"\xfe\xff"))
-    noted: list[tuple[str, int]] = []
-    if not wide and content.endswith(b"\0"):
+    is_utf16 = content.startswith((b"\xff\xfe", b"\xfe\xff"))
+    notes: list[tuple[str, int]] = []
+    if not is_utf16 and content.endswith(b"\0"):
         content = content.rstrip(b"\0")
-        noted.append(("zero bytes at the end", content.count(b"\n") + 1))
-    if b"\0" in content and not wide:
+        notes.append(("zero bytes at the end", content.count(b"\n") + 1))
+    if b"\0" in content and not is_utf16:
         line = content.count(b"\n", 0, content.index(b"\0")) + 1
         raise RobotFileError(
             "is not a text file: robots are read from URDF, MJCF and SDF, all XML", path=path, line=line
@@ -189,40 +189,40 @@ def read_markup(path: str, faults: Faults | None = None) -> Element:
     try:
         root = reader.read(content)
     except RobotFileError as error:
-        tolerated, more = (content, []) if wide else _tolerated(content)
-        if more:
+        tolerated, extra_notes = (content, []) if is_utf16 else _tolerated(content)
+        if extra_notes:
             root = _Reader(path, faults).read(tolerated)
-        elif (whole := reader.complete(content)) is not None:
-            root, more = whole, [("text after the end of its root element", error.line or whole.line)]
+        elif (element := reader.complete(content)) is not None:
+            root, extra_notes = element, [("text after the end of its root element", error.line or element.line)]
         else:
             raise
-        noted += more
+        notes += extra_notes
     if faults is None:
         return root
-    for words, line in noted:
-        error = RobotFileError(f"has {words}, which XML does not allow; take them out", path=path, line=line)
-        faults.leave_out(NOT_XML, words, error)
+    for note, line in notes:
+        error = RobotFileError(f"has {note}, which XML does not allow; take them out", path=path, line=line)
+        faults.leave_out(NOT_XML, note, error)
     return root
 
 
 def _tolerated(content: bytes) -> tuple[bytes, list[tuple[str, int]]]:
     """Return XML without the faults that other readers tolerate, with all lines kept, and these faults with lines."""
-    noted: list[tuple[str, int]] = []
+    notes: list[tuple[str, int]] = []
 
     def blank(match: re.Match[bytes]) -> bytes:
         return re.sub(rb"[^\n\r]", b" ", match[0])
 
     def comment(match: re.Match[bytes]) -> bytes:
         if b"--" in match[1] or match[1].endswith(b"-"):
-            noted.append(("two hyphens within a comment", content.count(b"\n", 0, match.start()) + 1))
+            notes.append(("two hyphens within a comment", content.count(b"\n", 0, match.start()) + 1))
         return blank(match)
 
     content = re.sub(rb"<!--(.*?)-->", comment, content, flags=re.DOTALL)
-    if late := re.match(rb"(?:\xef\xbb\xbf)?(\s+)<\?xml\s[^>]*\?>", content):
-        noted.append(("lines before the declaration <?xml", content.count(b"\n", 0, late.end(1)) + 1))
-        declaration = content[late.end(1) : late.end()]
-        content = declaration.replace(b"\n", b" ") + late[1] + content[late.end() :]
-    return content, noted
+    if misplaced := re.match(rb"(?:\xef\xbb\xbf)?(\s+)<\?xml\s[^>]*\?>", content):
+        notes.append(("lines before the declaration <?xml", content.count(b"\n", 0, misplaced.end(1)) + 1))
+        declaration = content[misplaced.end(1) : misplaced.end()]
+        content = declaration.replace(b"\n", b" ") + misplaced[1] + content[misplaced.end() :]
+    return content, notes
 
 
 class _Reader:
@@ -243,8 +243,8 @@ class _Reader:
         try:
             self.parser.Parse(content, True)
         except expat.ExpatError as error:
-            says = expat.ErrorString(error.code)
-            message = f"is not well-formed XML: {says} at column {error.offset + 1}{self.unclosed()}"
+            reason = expat.ErrorString(error.code)
+            message = f"is not well-formed XML: {reason} at column {error.offset + 1}{self.unclosed()}"
             raise RobotFileError(message, path=self.path, line=error.lineno) from None
         except (LookupError, ValueError) as error:
             raise RobotFileError(f"is in no encoding that can be read: {error}", path=self.path) from None
@@ -253,14 +253,14 @@ class _Reader:
 
     def complete(self, content: bytes) -> Element | None:
         """Return the root if it ended before the parser stopped, and no other element follows."""
-        rest = content[self.parser.ErrorByteIndex :]
-        return None if self.open or re.search(rb"<[^/!?]", rest) else self.root
+        remainder = content[self.parser.ErrorByteIndex :]
+        return None if self.open or re.search(rb"<[^/!?]", remainder) else self.root
 
     def unclosed(self) -> str:
         if not self.open:
             return ""
-        last = self.open[-1]
-        return f"; <{last.tag[:40]}> of line {last.line} is still open there"
+        element = self.open[-1]
+        return f"; <{element.tag[:40]}> of line {element.line} is still open there"
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         element = Element(tag, attributes, self.path, self.parser.CurrentLineNumber, faults=self.faults)

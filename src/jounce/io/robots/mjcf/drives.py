@@ -44,11 +44,11 @@ class Drives:
         """
         model, dof = self.model, self.model.jnt_dofadr[j]
         armature, damping = float(model.dof_armature[dof]), float(model.dof_damping[dof])
-        several = "damping" if model.dof_dampingpoly[dof].any() else ""
+        unsupported = "damping" if model.dof_dampingpoly[dof].any() else ""
         for k in np.flatnonzero(model.actuator_trnid[:, 0] == j):
             gear = float(model.actuator_gear[k, 0]) ** 2
             if np.any(model.actuator_dampingpoly[k]):
-                several = "damping of an actuator"
+                unsupported = "damping of an actuator"
             armature += gear * float(model.actuator_armature[k])
             damping += gear * float(np.ravel(model.actuator_damping[k])[0])
         given = {
@@ -59,14 +59,14 @@ class Drives:
         if single_spring(model, j) and self.works("SPRING"):
             given["stiffness"] = float(model.jnt_stiffness[j])
             given["spring_reference"] = float(model.qpos_spring[model.jnt_qposadr[j]])
-        return given, several
+        return given, unsupported
 
     def of_several(self, j: int) -> dict[str, float]:
         """Return the drive of a ball or free joint, which is the same along all its freedoms."""
         dof = self.model.jnt_dofadr[j]
-        on = {"armature": True, "damping": self.works("DAMPER"), "friction": self.works("FRICTIONLOSS")}
+        is_enabled = {"armature": True, "damping": self.works("DAMPER"), "friction": self.works("FRICTIONLOSS")}
         values = {key: float(getattr(self.model, f"dof_{name}")[dof]) for key, name in OF_BALL.items()}
-        return {key: value if on[key] else 0.0 for key, value in values.items()}
+        return {key: value if is_enabled[key] else 0.0 for key, value in values.items()}
 
     def ball(self, name: str, turns: Sequence[str], given: Mapping[str, float]) -> list[BallDrive]:
         """Return the drive of three turns, in a list that is empty if nothing drives them."""
@@ -88,8 +88,8 @@ class Drives:
             for part in parts:
                 name = self.names[int(model.wrap_objid[part])]
                 weights[name] = weights.get(name, 0.0) + float(model.wrap_prm[part])
-            rest = model.tendon_lengthspring[k]
-            springs = self.works("SPRING") and rest[0] == rest[1]
+            neutral_length = model.tendon_lengthspring[k]
+            springs = self.works("SPRING") and neutral_length[0] == neutral_length[1]
             given = {
                 "stiffness": float(model.tendon_stiffness[k]) if springs else 0.0,
                 "damping": float(model.tendon_damping[k]) if self.works("DAMPER") else 0.0,
@@ -98,7 +98,7 @@ class Drives:
             }
             if any(given.values()) and not set(weights) <= set(fixed):
                 name = model.tendon(k).name or f"tendon_{k}"
-                tendons.append(Tendon(name, weights, rest=float(rest[0]), **given))
+                tendons.append(Tendon(name, weights, rest=float(neutral_length[0]), **given))
         return tendons
 
 

@@ -45,9 +45,9 @@ def included(root: Element, allow: Iterable[str | PathLike[str]] = ()) -> list[E
         If a file cannot be read, or lies where it may not.
     """
     elements: dict[str, Element] = {}
-    waiting = [root]
-    while waiting:
-        holder = waiting.pop()
+    pending = [root]
+    while pending:
+        holder = pending.pop()
         for element in holder.walk():
             name = element.attributes.get("file", "")
             if element.tag not in ("include", "model") or not name:
@@ -57,7 +57,7 @@ def included(root: Element, allow: Iterable[str | PathLike[str]] = ()) -> list[E
                 if os.path.lexists(path):
                     if path not in elements:
                         elements[path] = _included(element, name, path)
-                        waiting.append(elements[path])
+                        pending.append(elements[path])
                     break
     return list(elements.values())
 
@@ -107,16 +107,16 @@ class _Copies:
         if depth > MOST_NESTED:
             raise root.error(f"files attach or include one another more than {MOST_NESTED} deep")
         self._counts[id(root)] = total = 0  # MuJoCo refuses a file within itself
-        waiting = [(root, 1)]
-        while waiting:
-            element, copies = waiting.pop()
+        pending = [(root, 1)]
+        while pending:
+            element, copies = pending.pop()
             if element.tag == "replicate":
                 copies *= max(1, int(element.number("count", "replicate", "count")))
             total += copies * self._body_count(element, depth)
             if total > MOST_BODIES or copies > MOST_BODIES:
                 message = f"more than {MOST_BODIES} bodies or copies with all that is repeated"
                 raise element.error(message, "replicate")
-            waiting.extend((child, copies) for child in element.children)
+            pending.extend((child, copies) for child in element.children)
         self._counts[id(root)] = total
         return total
 

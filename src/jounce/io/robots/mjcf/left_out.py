@@ -47,30 +47,32 @@ class SkippedPart(NamedTuple):
 
 def left_out_of_spec(spec: Any, mujoco: Any) -> list[SkippedPart]:
     """Return the parts that are left out with tendons and their actuators, before these are removed."""
-    on = _is_enabled(spec.option.disableflags, mujoco)
+    active = _is_enabled(spec.option.disableflags, mujoco)
     # MuJoCo itself refuses damping and armature of actuators of other kinds
     drives = [(k, x) for k, x in enumerate(spec.actuators) if x.trntype == mujoco.mjtTrn.mjTRN_TENDON]
     kinds = ((OF_TENDONS, "tendon", enumerate(spec.tendons)), (OF_DRIVES, "actuator", drives))
-    left = []
+    skipped = []
     for headings, kind, parts in kinds:
         for k, part in parts:
             name = part.name or f"{kind}_{k}"
             read = _read_of(part, mujoco) if kind == "tendon" else ()
             for key, heading in headings.items():
                 value = np.ravel(getattr(part, key))
-                if value.any() and on(key) and (key not in read or value[1:].any()):
-                    left.append(SkippedPart(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
-    for k, actuator in enumerate(spec.actuators if on("actuation") else ()):
+                if value.any() and active(key) and (key not in read or value[1:].any()):
+                    skipped.append(
+                        SkippedPart(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value))
+                    )
+    for k, actuator in enumerate(spec.actuators if active("actuation") else ()):
         if actuator.ctrlspec == int(mujoco.mjtCtrlInput.mjINPUT_NONE):  # such as friction of a motor, or its brake
             name = actuator.name or f"actuator_{k}"
-            left.append(SkippedPart(UNCONTROLLED, name, line_of(actuator.info), f"actuators.{name}.input", "none"))
-    for k, tendon in enumerate(spec.tendons if on("range") else ()):
+            skipped.append(SkippedPart(UNCONTROLLED, name, line_of(actuator.info), f"actuators.{name}.input", "none"))
+    for k, tendon in enumerate(spec.tendons if active("range") else ()):
         automatic = spec.compiler.autolimits and tendon.limited == int(mujoco.mjtLimited.mjLIMITED_AUTO)
         if tendon.limited == int(mujoco.mjtLimited.mjLIMITED_TRUE) or (automatic and tendon.range[0] < tendon.range[1]):
             name = tendon.name or f"tendon_{k}"
-            where = f"tendons.{name}.range"
-            left.append(SkippedPart(RANGE_OF_TENDONS, name, line_of(tendon.info), where, tendon.range.tolist()))
-    return left
+            location = f"tendons.{name}.range"
+            skipped.append(SkippedPart(RANGE_OF_TENDONS, name, line_of(tendon.info), location, tendon.range.tolist()))
+    return skipped
 
 
 def _read_of(tendon: Any, mujoco: Any) -> tuple[str, ...]:
@@ -99,29 +101,29 @@ def left_out_of_model(
     fixed : container of str
         Joints that an equality holds in place, which no force moves.
     """
-    on = _is_enabled(model.opt.disableflags, mujoco)
-    free = [name not in fixed for name in joints]
+    active = _is_enabled(model.opt.disableflags, mujoco)
+    is_free = [name not in fixed for name in joints]
     for j, name in enumerate(joints):
         stiffness = np.array([model.jnt_stiffness[j], *model.jnt_stiffnesspoly[j]])
-        if stiffness.any() and on("stiffness") and free[j] and not single_spring(model, j):
+        if stiffness.any() and active("stiffness") and is_free[j] and not single_spring(model, j):
             yield SkippedPart(JOINT_SPRINGS, name, None, f"joints.{name}.stiffness", _plain(stiffness))
-        elif stiffness.any() and on("stiffness") and free[j] and model.jnt_springyield[j]:
+        elif stiffness.any() and active("stiffness") and is_free[j] and model.jnt_springyield[j]:
             yield SkippedPart(YIELD, name, None, f"joints.{name}.springyield", float(model.jnt_springyield[j]))
-        if model.jnt_limited[j] and model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_BALL) and on("range"):
+        if model.jnt_limited[j] and model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_BALL) and active("range"):
             yield SkippedPart(RANGE_OF_BALLS, name, None, f"joints.{name}.range", float(model.jnt_range[j, 1]))
-    passive = on("stiffness") or on("damping")  # MuJoCo disables all such forces if it disables both
-    falls = model.opt.gravity.any() and on("gravity")
-    matters = passive and falls and model.jnt_actgravcomp.any()  # otherwise bodies feel less gravity
-    for k in np.flatnonzero((model.body_gravcomp != 0) & (model.body_mass > 0)).tolist() if matters else ():
-        if any(free[j] and not model.jnt_actgravcomp[j] for j in _moved_by(model, k)):
+    passive = active("stiffness") or active("damping")  # MuJoCo disables all such forces if it disables both
+    falls = model.opt.gravity.any() and active("gravity")
+    needs_compensation = passive and falls and model.jnt_actgravcomp.any()  # otherwise bodies feel less gravity
+    for k in np.flatnonzero((model.body_gravcomp != 0) & (model.body_mass > 0)).tolist() if needs_compensation else ():
+        if any(is_free[j] and not model.jnt_actgravcomp[j] for j in _moved_by(model, k)):
             yield SkippedPart(
                 COMPENSATION, bodies[k], None, f"links.{bodies[k]}.gravcomp", float(model.body_gravcomp[k])
             )
     fluid = {key: float(getattr(model.opt, key)) for key in FLUID_UNITS if getattr(model.opt, key)}
-    heavy = np.flatnonzero(model.body_mass).tolist()
-    if fluid and passive and any(free[j] for k in heavy for j in _moved_by(model, k)):
-        shown = " and ".join(f"{key} {value:g} {FLUID_UNITS[key]}" for key, value in fluid.items())
-        yield SkippedPart(FLUID, shown, None, f"option.{next(iter(fluid))}", next(iter(fluid.values())))
+    massive = np.flatnonzero(model.body_mass).tolist()
+    if fluid and passive and any(is_free[j] for k in massive for j in _moved_by(model, k)):
+        phrase = " and ".join(f"{key} {value:g} {FLUID_UNITS[key]}" for key, value in fluid.items())
+        yield SkippedPart(FLUID, phrase, None, f"option.{next(iter(fluid))}", next(iter(fluid.values())))
 
 
 def note_shells(spec: Any, model: Any, mujoco: Any, bodies: Sequence[str], path: str, faults: Faults) -> None:

@@ -120,10 +120,10 @@ def _check_numbers(root: Element) -> None:
                 element.numbers(key, len(words), element.attributes.get("name") or element.tag, key)
 
 
-def _as_file_error(says: str, root: Element) -> RobotFileError:
+def _as_file_error(error_text: str, root: Element) -> RobotFileError:
     """Return a message of MuJoCo as an error with the place that it names."""
-    name = re.search(r"[Ee]lement (?:name )?'([^']+)'", says)
-    words = re.sub(r"\s*\n?Element (?:name )?'.*", "", says, flags=re.DOTALL)
+    name = re.search(r"[Ee]lement (?:name )?'([^']+)'", error_text)
+    words = re.sub(r"\s*\n?Element (?:name )?'.*", "", error_text, flags=re.DOTALL)
     words = ascii(re.sub(r"^(?:XML )?Error: (?:Error: )?", "", words.strip()))[1:-1]
     message = f"MuJoCo cannot use this: {' '.join(words.replace(chr(92) + 'n', ' ').split())}"
     if "opening file" in words and (name is None or name[1] != "include"):
@@ -132,7 +132,7 @@ def _as_file_error(says: str, root: Element) -> RobotFileError:
     elif "mass and inertia of moving bodies" in words:
         message += "; give the body an <inertial> with a mass and an inertia, or a <geom> with a size"
     named = None if name is None else ascii(name[1])[1:-1]
-    return RobotFileError(message, path=root.path, line=line_of(says), name=named)
+    return RobotFileError(message, path=root.path, line=line_of(error_text), name=named)
 
 
 def _strip(spec: Any, mujoco: Any, tied: Container[str]) -> None:
@@ -224,15 +224,15 @@ class _Reader:
     def _located(self, error: RobotError) -> RobotFileError:
         return self.error(error.message, error.name or "", value=error.value)
 
-    def tell(self, noted: Iterable[SkippedPart], parts: Iterable[Element]) -> None:
-        """Record the parts that are left out, of tendons and actuators (`noted`) and of the compiled model."""
+    def tell(self, skipped: Iterable[SkippedPart], parts: Iterable[Element]) -> None:
+        """Record the parts that are left out, of tendons and actuators (`skipped`) and of the compiled model."""
         options = [element for part in parts for element in part.walk() if element.tag == "option"]
         self.lines |= {f"option.{key}": element.line for element in options for key in element.attributes}
-        more = left_out_of_model(self.model, self.mujoco, self.bodies, self.joint_names, self.ties.fixed)
-        for heading, shown, line, name, value in (*noted, *more):
+        others = left_out_of_model(self.model, self.mujoco, self.bodies, self.joint_names, self.ties.fixed)
+        for heading, label, line, name, value in (*skipped, *others):
             if line is not None:
                 self.lines[name] = line
-            self.faults.leave_out(heading, shown, self.error(left_out(heading), name, value=value))
+            self.faults.leave_out(heading, label, self.error(left_out(heading), name, value=value))
         note_shells(self.spec, self.model, self.mujoco, self.bodies, self.root.path, self.faults)
 
     def _tie(self) -> None:
@@ -248,7 +248,7 @@ class _Reader:
                 closure = self._closure(k, names[k])
                 welded = [int(model.body_weldid[self.bodies.index(link)]) for link in closure.links]
                 mocap = [model.body_mocapid[body] >= 0 for body in welded]
-                rigid = [0 if still else body for body, still in zip(welded, mocap, strict=True)]
+                rigid = [0 if is_mocap else body for body, is_mocap in zip(welded, mocap, strict=True)]
                 if rigid[0] == rigid[1]:
                     message = f"{closure.links[0]} and {closure.links[1]} are fixed to one another, and need no closure"
                     self.faults.leave_out(FIXED_ALREADY, names[k], RobotFileError(message, **location))
@@ -301,8 +301,8 @@ class _Reader:
         position, rotation = np.array(model.body_pos[k]), quaternion_matrix(model.body_quat[k])
         numbers = range(model.body_jntadr[k], model.body_jntadr[k] + model.body_jntnum[k])
         for j in numbers:
-            anchor, last = np.array(model.jnt_pos[j]), j == numbers[-1]
-            link = name if last and not anchor.any() else self._unused(f"{name}_{self.joint_names[j]}")
+            anchor, is_last = np.array(model.jnt_pos[j]), j == numbers[-1]
+            link = name if is_last and not anchor.any() else self._unused(f"{name}_{self.joint_names[j]}")
             if model.jnt_type[j] == self.kind["free"]:
                 self._expand(j, parent, name, np.zeros(3), np.eye(3))
                 return
@@ -331,9 +331,9 @@ class _Reader:
             rotation = rotation @ turn_about(axis, -reference)
         elif reference:
             position = position - rotation @ axis * reference
-        drives, several = self.drives.of_joint(j)
-        if several:
-            raise self.error(f"{several} must be one number, proportional to the velocity", f"joints.{name}.damping")
+        drives, fault = self.drives.of_joint(j)
+        if fault:
+            raise self.error(f"{fault} must be one number, proportional to the velocity", f"joints.{name}.damping")
         limited = bool(model.jnt_limited[j])
         lower, upper = (float(value) for value in model.jnt_range[j]) if limited else (None, None)
         kind = "prismatic" if not turning else "revolute" if limited else "continuous"
@@ -367,13 +367,13 @@ class _Reader:
                     value = np.ravel(values).tolist()
                     raise self.error(f"{message}; set it to zero", f"joints.{name}.{field}", value=value)
         pose = {"position": position, "rotation": rotation}
-        for part, at in zip(joints, start[-len(joints) :], strict=True):  # base_x may be the name of another joint
+        for part, place in zip(joints, start[-len(joints) :], strict=True):  # base_x may be the name of another joint
             end = child if part is joints[-1] else self._unused(part.child)
             if end != child:
                 self.links.append(Link(end))
-            own = {"name": self._unused(part.name), "parent": parent, "child": end, "start": float(at)}
-            along = {} if part.turning else drives
-            self.joints.append(dataclasses.replace(part, **own, **pose, **along))
+            arguments = {"name": self._unused(part.name), "parent": parent, "child": end, "start": float(place)}
+            drive_arguments = {} if part.turning else drives
+            self.joints.append(dataclasses.replace(part, **arguments, **pose, **drive_arguments))
             parent, pose = end, {}
         self.couplings += self.drives.ball(name, [joint.name for joint in self.joints[-3:]], drives)
 

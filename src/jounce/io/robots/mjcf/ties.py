@@ -22,12 +22,12 @@ def tied_tendons(spec: Any, mujoco: Any, path: str) -> set[str]:
     RobotFileError
         If one runs between sites.
     """
-    along = {t.name for t in spec.tendons if all(part.type == mujoco.mjtWrap.mjWRAP_JOINT for part in t.path)}
+    joint_tendons = {t.name for t in spec.tendons if all(part.type == mujoco.mjtWrap.mjWRAP_JOINT for part in t.path)}
     tied: set[str] = set()
     for equality in spec.equalities:
         if equality.active and equality.type == mujoco.mjtEq.mjEQ_TENDON:
             names = {name for name in (equality.name1, equality.name2) if name}
-            if names & {tendon.name for tendon in spec.tendons} - along:
+            if names & {tendon.name for tendon in spec.tendons} - joint_tendons:
                 name = f"equality.{equality.name}" if equality.name else "equality"
                 message = f"an active equality of a tendon between sites {NO_CLOSURE}"
                 raise RobotFileError(message, path=path, line=line_of(equality.info), name=ascii(name)[1:-1])
@@ -42,8 +42,8 @@ def linear_tendons(spec: Any, mujoco: Any) -> set[str]:
     """
     for k, tendon in enumerate(spec.tendons):
         tendon.name = tendon.name or f"tendon_{k}"
-    along = mujoco.mjtWrap.mjWRAP_JOINT
-    return {t.name for t in spec.tendons if len(t.path) and all(part.type == along for part in t.path)}
+    kind = mujoco.mjtWrap.mjWRAP_JOINT
+    return {t.name for t in spec.tendons if len(t.path) and all(part.type == kind for part in t.path)}
 
 
 class JointRelations:
@@ -135,29 +135,29 @@ class JointRelations:
             if weight and int(self.model.jnt_type[joint]) not in self.single:
                 message = "an equality cannot tie a joint of several coordinates; close a loop by connect or weld"
                 raise RobotFileError(f"{message}, or {INACTIVE}", **location, value=self.names[joint])
-        left, rest, sizes = dict[int, float](), constant, dict[int, float]()
+        remaining, offset, sizes = dict[int, float](), constant, dict[int, float]()
         for joint, weight in weights.items():
             slopes, start = self.followers.get(joint, ({joint: 1.0}, 0.0))
-            rest -= weight * start
+            offset -= weight * start
             for leader, slope in slopes.items():
-                left[leader] = left.get(leader, 0.0) + weight * slope
+                remaining[leader] = remaining.get(leader, 0.0) + weight * slope
                 sizes[leader] = sizes.get(leader, 0.0) + abs(weight * slope)
-        left = {joint: weight for joint, weight in left.items() if abs(weight) > ROUNDING * sizes[joint]}
-        if not left:
+        remaining = {joint: weight for joint, weight in remaining.items() if abs(weight) > ROUNDING * sizes[joint]}
+        if not remaining:
             size = abs(constant) + sum(abs(w * self.followers[j][1]) for j, w in weights.items() if j in self.followers)
-            if abs(rest) > ROUNDING * size:
+            if abs(offset) > ROUNDING * size:
                 tied = [self.names[joint] for joint, weight in weights.items() if weight]
-                message = f"contradicts the equalities before it, by {rest:.6g}; {INACTIVE}"
+                message = f"contradicts the equalities before it, by {offset:.6g}; {INACTIVE}"
                 raise RobotFileError(message, **location, value=tied)
             return
-        passive = set(left) - self.actuated if len(left) > 2 else set[int]()
-        follower = max(left, key=lambda j: (j in first, j in passive, j in weights, list(left).index(j)))
-        whole = left.pop(follower)
-        made = ({joint: -weight / whole for joint, weight in left.items()}, rest / whole)
+        passive = set(remaining) - self.actuated if len(remaining) > 2 else set[int]()
+        follower = max(remaining, key=lambda j: (j in first, j in passive, j in weights, list(remaining).index(j)))
+        divisor = remaining.pop(follower)
+        tie = ({joint: -weight / divisor for joint, weight in remaining.items()}, offset / divisor)
         for joint, (slopes, start) in self.followers.items():
             if follower in slopes:
                 factor = slopes.pop(follower)
-                for leader, slope in made[0].items():
+                for leader, slope in tie[0].items():
                     slopes[leader] = slopes.get(leader, 0.0) + factor * slope
-                self.followers[joint] = ({k: x for k, x in slopes.items() if x}, start + factor * made[1])
-        self.followers[follower] = made
+                self.followers[joint] = ({k: x for k, x in slopes.items() if x}, start + factor * tie[1])
+        self.followers[follower] = tie

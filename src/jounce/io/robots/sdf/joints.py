@@ -69,26 +69,28 @@ class SdfJoint:
 
 def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, ...]) -> SdfJoint:
     """Return a joint in the frame of the model."""
-    where = ("joints", name)
-    check_known(element, JOINT, *where)
-    kind = element.text("type", *where, "type")
+    location = ("joints", name)
+    check_known(element, JOINT, *location)
+    kind = element.text("type", *location, "type")
     valid = (*AXES, "gearbox")
     if kind not in valid:
-        raise element.error(no_such("joint", kind, valid, "type"), *where, "type", value=kind)
+        raise element.error(no_such("joint", kind, valid, "type"), *location, "type", value=kind)
     ends = []
     for role in ("parent", "child"):
-        part = needed(element, role, *where)
-        ends.append(frames.link(text_of(element, role, *where), part, *where, role))
+        part = needed(element, role, *location)
+        ends.append(frames.link(text_of(element, role, *location), part, *location, role))
     if ends[0] == ends[1]:
-        raise element.error("must join two different links", *where, value=ends[0])
+        raise element.error("must join two different links", *location, value=ends[0])
     origin = frames.pose(name)
     tags = AXIS_TAGS[: 2 if kind == "gearbox" else AXES[kind]]
-    armature = rotor_of(element, *where) if len(tags) == 1 else 0.0
-    axes = tuple(_axis(needed(element, tag, *where), origin, frames, version, armature, *where, tag) for tag in tags)
+    armature = rotor_of(element, *location) if len(tags) == 1 else 0.0
+    axes = tuple(
+        _axis(needed(element, tag, *location), origin, frames, version, armature, *location, tag) for tag in tags
+    )
     return SdfJoint(name, kind, ends[0], ends[1], origin.position, axes, element)
 
 
-def pitch_of(element: Element, *where: str) -> float:
+def pitch_of(element: Element, *location: str) -> float:
     """Return the travel of a screw joint along its axis per radian, m/rad.
 
     ``screw_thread_pitch`` is the travel per turn, right-handed; the older ``thread_pitch`` is in radians per meter,
@@ -99,15 +101,15 @@ def pitch_of(element: Element, *where: str) -> float:
     RobotFileError
         If a value is no number, or the older one is zero.
     """
-    if (old := element.only("thread_pitch", *where)) and not element.only("screw_thread_pitch", *where):
-        radians = number_of(element, "thread_pitch", *where, default=1.0)
+    if (old := element.only("thread_pitch", *location)) and not element.only("screw_thread_pitch", *location):
+        radians = number_of(element, "thread_pitch", *location, default=1.0)
         if radians == 0:
-            raise old.error("must not be zero: it is in radians per meter", *where, "thread_pitch", value=radians)
+            raise old.error("must not be zero: it is in radians per meter", *location, "thread_pitch", value=radians)
         return -1.0 / radians
-    return number_of(element, "screw_thread_pitch", *where, default=1.0) / (2 * math.pi)
+    return number_of(element, "screw_thread_pitch", *location, default=1.0) / (2 * math.pi)
 
 
-def rotor_of(element: Element, *where: str) -> float:
+def rotor_of(element: Element, *location: str) -> float:
     """Return the inertia of the rotor of a joint, as seen at the joint and read by Drake.
 
     Raises
@@ -115,45 +117,47 @@ def rotor_of(element: Element, *where: str) -> float:
     RobotFileError
         If a value is no number, or the inertia is negative.
     """
-    inertia, ratio = (number_of(element, key, *where, default=default) for key, default in ((ROTOR, 0.0), (RATIO, 1.0)))
+    inertia, ratio = (
+        number_of(element, key, *location, default=default) for key, default in ((ROTOR, 0.0), (RATIO, 1.0))
+    )
     if inertia < 0:
-        raise needed(element, ROTOR, *where).error("must be zero or greater", *where, ROTOR, value=inertia)
+        raise needed(element, ROTOR, *location).error("must be zero or greater", *location, ROTOR, value=inertia)
     return inertia * ratio**2
 
 
 def _axis(
-    axis: Element, pose: FramePose, frames: Frames, version: tuple[int, ...], armature: float, *where: str
+    axis: Element, pose: FramePose, frames: Frames, version: tuple[int, ...], armature: float, *location: str
 ) -> SdfAxis:
-    check_known(axis, AXIS, *where)
-    xyz = axis.only("xyz", *where)
-    direction = np.array([0.0, 0.0, 1.0]) if xyz is None else vector_of(xyz, *where, "xyz")
+    check_known(axis, AXIS, *location)
+    xyz = axis.only("xyz", *location)
+    direction = np.array([0.0, 0.0, 1.0]) if xyz is None else vector_of(xyz, *location, "xyz")
     frame = "" if xyz is None else xyz.attributes.get("expressed_in", "")
     old = version < (1, 7)
-    if old and flag_of(axis, "use_parent_model_frame", *where, default=version < (1, 5)):
+    if old and flag_of(axis, "use_parent_model_frame", *location, default=version < (1, 5)):
         frame = MODEL
-    rotation = frames.of(frame, xyz or axis, *where, "xyz").rotation if frame else pose.rotation
-    limit, dynamics = axis.only("limit", *where), axis.only("dynamics", *where)
+    rotation = frames.of(frame, xyz or axis, *location, "xyz").rotation if frame else pose.rotation
+    limit, dynamics = axis.only("limit", *location), axis.only("dynamics", *location)
     for part, valid in ((limit, LIMIT), (dynamics, DYNAMICS)):
         if part is not None:
-            check_known(part, valid, *where, part.tag)
-    values = {key: number_of(dynamics, key, *where, "dynamics", default=0.0) for key in DYNAMICS}
+            check_known(part, valid, *location, part.tag)
+    values = {key: number_of(dynamics, key, *location, "dynamics", default=0.0) for key in DYNAMICS}
     for key, value in values.items():
         if value < 0 and key != "spring_reference":
-            raise (dynamics or axis).error("must be zero or greater", *where, "dynamics", key, value=value)
+            raise (dynamics or axis).error("must be zero or greater", *location, "dynamics", key, value=value)
     drives = (values["damping"], values["friction"], armature, values["spring_stiffness"], values["spring_reference"])
-    return SdfAxis(axis.tag, rotation @ direction, _limits(limit, *where), *drives)
+    return SdfAxis(axis.tag, rotation @ direction, _limits(limit, *location), *drives)
 
 
-def _limits(limit: Element | None, *where: str) -> Limits:
+def _limits(limit: Element | None, *location: str) -> Limits:
     if limit is None:
         return Limits()
     keys = ("lower", "upper", "velocity", "effort")
-    given = {key: number_of(limit, key, *where, "limit", default=math.nan, infinite=True) for key in keys}
+    given = {key: number_of(limit, key, *location, "limit", default=math.nan, infinite=True) for key in keys}
     bounds = {key: x for key, x in given.items() if abs(x) < UNBOUNDED and (key in keys[:2] or x > 0)}
     try:
         return Limits(**bounds)
     except RobotError as error:
-        raise limit.error(error.message, *where, "limit", value=error.value) from None
+        raise limit.error(error.message, *location, "limit", value=error.value) from None
 
 
 def with_named_axes(joint: Element, version: tuple[int, ...]) -> Element:
@@ -161,8 +165,8 @@ def with_named_axes(joint: Element, version: tuple[int, ...]) -> Element:
     children = []
     for axis in joint.children:
         if axis.tag in ("axis", "axis2") and version < (1, 7):
-            where = ("joints", joint.attributes.get("name", ""), axis.tag)
-            in_model = flag_of(axis, "use_parent_model_frame", *where, default=version < (1, 5))
+            location = ("joints", joint.attributes.get("name", ""), axis.tag)
+            in_model = flag_of(axis, "use_parent_model_frame", *location, default=version < (1, 5))
             parts = [x for x in axis.children if x.tag != "use_parent_model_frame"]
             if in_model:
                 directions = [x for x in parts if x.tag == "xyz"] or [

@@ -57,8 +57,8 @@ def note_left_out(
         faults.leave_out(STATIC, model.attributes.get("name", "robot"), error)
     for joint in closing:
         for axis in joint.axes:
-            where, headings = ("joints", joint.name, axis.tag, "dynamics"), SPRING | IN_LOOPS
-            _note_numbers(needed(joint.element, axis.tag).only("dynamics"), joint.name, headings, faults, *where)
+            location, headings = ("joints", joint.name, axis.tag, "dynamics"), SPRING | IN_LOOPS
+            _note_numbers(needed(joint.element, axis.tag).only("dynamics"), joint.name, headings, faults, *location)
     _note_extensions(model, tree, closing, faults)
     for name, link in links.items():
         if flag_of(link, "kinematic", "links", name):
@@ -105,12 +105,14 @@ def follower(plugin: Element) -> str:
     return "" if part is None else part.content.strip()
 
 
-def _note_numbers(holder: Element | None, shown: str, headings: Mapping[str, str], faults: Faults, *where: str) -> None:
+def _note_numbers(
+    holder: Element | None, label: str, headings: Mapping[str, str], faults: Faults, *location: str
+) -> None:
     """Record the nonzero numbers within an element, once for each heading."""
     noted = set()
     for key, heading in headings.items():
-        value = number_of(holder, key, *where, default=0.0)
+        value = number_of(holder, key, *location, default=0.0)
         if holder is not None and value and heading not in noted:
             noted.add(heading)
-            error = needed(holder, key).error(left_out(heading), *where, key, value=value)
-            faults.leave_out(heading, shown, error)
+            error = needed(holder, key).error(left_out(heading), *location, key, value=value)
+            faults.leave_out(heading, label, error)

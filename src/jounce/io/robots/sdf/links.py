@@ -21,49 +21,49 @@ INERTIAL = ("pose", "mass", "inertia", "density", "auto_inertia_params", "fluid_
 
 def read_inertia(name: str, element: Element, frames: Frames, faults: Faults) -> Inertia | None:
     """Return the inertia of a link in its frame; None if all of it is zero."""
-    where = ("links", name)
-    check_known(element, LINK, *where)
-    inertial = element.only("inertial", *where)
+    location = ("links", name)
+    check_known(element, LINK, *location)
+    inertial = element.only("inertial", *location)
     if inertial is None:
         message = "<inertial> is missing: SDF takes the link for 1 kg with moments of 1 kg m^2; give it its own"
-        faults.add(WITHOUT_INERTIAL, name, element.error(message, *where))
+        faults.add(WITHOUT_INERTIAL, name, element.error(message, *location))
         return Inertia(1.0, tensor=np.eye(3))
-    where = (*where, "inertial")
-    check_known(inertial, INERTIAL, *where)
-    _check_readable(name, inertial, faults, *where)
+    location = (*location, "inertial")
+    check_known(inertial, INERTIAL, *location)
+    _check_readable(name, inertial, faults, *location)
     if inertial.attributes.get("auto", "false").strip() in ("true", "1"):
         inertia = inertia_of_shapes(name, element, inertial, frames, faults)
         faults.check(inertia, name, inertial.line)
         return inertia
-    moments = inertial.only("inertia", *where)
+    moments = inertial.only("inertia", *location)
     if moments is not None:
-        check_known(moments, TENSOR, *where, "inertia")
+        check_known(moments, TENSOR, *location, "inertia")
     _check_whole(name, inertial, moments, faults)
-    mass = number_of(inertial, "mass", *where, default=1.0)
+    mass = number_of(inertial, "mass", *location, default=1.0)
     xx, xy, xz, yy, yz, zz = (
-        number_of(moments, key, *where, "inertia", default=float(key[1] == key[2])) for key in TENSOR
+        number_of(moments, key, *location, "inertia", default=float(key[1] == key[2])) for key in TENSOR
     )
     if mass < 0:
-        raise inertial.error("must be greater than zero", *where, "mass", value=mass)
+        raise inertial.error("must be greater than zero", *location, "mass", value=mass)
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if mass == 0 and not tensor.any():
         return None
     inertia = Inertia(mass, tensor=tensor, strict=False)
     faults.check(inertia, name, (moments or inertial).line)
-    return inertia.moved(*pose_of(inertial, *where))
+    return inertia.moved(*pose_of(inertial, *location))
 
 
-def _check_readable(name: str, inertial: Element, faults: Faults, *where: str) -> None:
+def _check_readable(name: str, inertial: Element, faults: Faults, *location: str) -> None:
     """Raise an error for an inertia with another reference frame; record the mass of a fluid, which is left out."""
-    pose, added = inertial.only("pose", *where), inertial.only("fluid_added_mass", *where)
+    pose, added = inertial.only("pose", *location), inertial.only("fluid_added_mass", *location)
     given = {} if pose is None else pose.attributes
     frame = given.get("relative_to") or given.get("frame") or name
     if pose is not None and frame != name:
         message = "an inertia is placed in the frame of its link, relative to nothing else"
-        raise pose.error(message, *where, "pose", value=frame)
+        raise pose.error(message, *location, "pose", value=frame)
     for entry in [] if added is None else added.children:
-        if value := entry.content_numbers(1, *where, added.tag if added else "", entry.tag)[0]:
-            error = entry.error(left_out(FLUID_MASS), *where, "fluid_added_mass", value=value)
+        if value := entry.content_numbers(1, *location, added.tag if added else "", entry.tag)[0]:
+            error = entry.error(left_out(FLUID_MASS), *location, "fluid_added_mass", value=value)
             faults.leave_out(FLUID_MASS, name, error)
 
 

@@ -98,16 +98,16 @@ def chosen_model(
     joints = [] if world is None else world.every("joint")
     if any(label in _models_of(joint) for joint in joints):
         return ChosenModel(_joined(label, given, joints, reader), FramePose(np.zeros(3), np.eye(3)), world, NEWEST)
-    whole = reader.flattened(model, its_version, top=True)
-    if reference_pose(whole)[1]:  # relative to another model, or to a frame of the world
+    flat = reader.flattened(model, its_version, top=True)
+    if reference_pose(flat)[1]:  # relative to another model, or to a frame of the world
         frames = [] if world is None else world.every("frame")
-        everything = dataclasses.replace(model, attributes={"name": WORLD}, children=[*frames])
-        for other, one in given.items():
-            if one.world is world:
-                everything.children += scope(other, reader.flattened(one.model, one.version, top=True))
-        pose = Frames(everything, named(everything)).of(f"{label}::{MODEL}", model, "pose")
-        return ChosenModel(whole, pose, world, NEWEST)
-    return ChosenModel(whole, placed(whole), world, NEWEST)
+        result = dataclasses.replace(model, attributes={"name": WORLD}, children=[*frames])
+        for other, item in given.items():
+            if item.world is world:
+                result.children += scope(other, reader.flattened(item.model, item.version, top=True))
+        pose = Frames(result, named(result)).of(f"{label}::{MODEL}", model, "pose")
+        return ChosenModel(flat, pose, world, NEWEST)
+    return ChosenModel(flat, placed(flat), world, NEWEST)
 
 
 def version_of(root: Element) -> tuple[int, ...]:
@@ -131,17 +131,17 @@ class _SourceModel(NamedTuple):
 
 def _only_one(given: dict[str, _SourceModel], reader: _Models) -> str:
     """Return the name of the only model, or of the only one that moves or is not static."""
-    loose = [name for name, one in given.items() if not _static(one.model)]
-    moving = [name for name in loose if _moves(given[name], reader)] if len(given) > 1 else []
-    for names in (list(given), moving, loose if not moving else []):
+    movable = [name for name, item in given.items() if not _static(item.model)]
+    moving = [name for name in movable if _moves(given[name], reader)] if len(given) > 1 else []
+    for names in (list(given), moving, movable if not moving else []):
         if len(names) == 1:
             return names[0]
-    several = moving or loose or list(given)
-    words = "that move" if moving else "and none that moves"
+    candidates = moving or movable or list(given)
+    phrase = "that move" if moving else "and none that moves"
     message = (
-        f"holds {len(several) if moving else len(given)} models {words}; choose one with model=NAME (--model NAME)"
+        f"holds {len(candidates) if moving else len(given)} models {phrase}; choose one with model=NAME (--model NAME)"
     )
-    raise given[several[1]].model.error(message, "models", value=several)
+    raise given[candidates[1]].model.error(message, "models", value=candidates)
 
 
 def _static(model: Element) -> bool:
@@ -154,8 +154,8 @@ def _moves(given: _SourceModel, reader: _Models) -> bool:
         return True
     if not any(part.tag == "include" for part in given.model.walk()):
         return False
-    whole = reader.flattened(given.model, given.version, top=True)
-    return any(joint.attributes.get("type") != "fixed" for joint in whole.every("joint"))
+    flat = reader.flattened(given.model, given.version, top=True)
+    return any(joint.attributes.get("type") != "fixed" for joint in flat.every("joint"))
 
 
 def _models_of(joint: Element) -> set[str]:
@@ -173,17 +173,17 @@ def _joined(label: str, given: dict[str, _SourceModel], joints: list[Element], r
                 for end in ends - given.keys():
                     raise joint.error(no_such("model of this world", end, given), "joints", value=end)
                 members |= ends
-    whole = dataclasses.replace(given[label].model, attributes={"name": label}, children=[])
+    root = dataclasses.replace(given[label].model, attributes={"name": label}, children=[])
     for name in (name for name in given if name in members):
         model = reader.flattened(given[name].model, given[name].version, top=True)
-        whole.children += scope(name, model)
+        root.children += scope(name, model)
         if _static(model):
             ends = {"parent": WORLD, "child": f"{name}::{Frames(model, named(model)).canonical_link()}"}
             fixed = [made(model, tag, text) for tag, text in ends.items()]
             attributes = {"name": f"{name}::{WORLD}_fixed", "type": "fixed"}
-            whole.children.append(dataclasses.replace(model, tag="joint", attributes=attributes, children=fixed))
-    whole.children += [joint for joint in joints if _models_of(joint) & members]
-    return whole
+            root.children.append(dataclasses.replace(model, tag="joint", attributes=attributes, children=fixed))
+    root.children += [joint for joint in joints if _models_of(joint) & members]
+    return root
 
 
 class _Models:
@@ -224,10 +224,10 @@ class _Models:
                 if self.links > MOST_LINKS:
                     raise child.error(f"more than {MOST_LINKS} links with all that is included", "links")
             children.append(self._newest(child, model, version) if child.tag == "joint" else child)
-        whole = dataclasses.replace(model, children=children)
+        result = dataclasses.replace(model, children=children)
         if not top:
-            named(whole)
-        return whole
+            named(result)
+        return result
 
     def _newest(self, joint: Element, model: Element, version: tuple[int, ...]) -> Element:
         """Return a joint in the newest version: its axes name their frames, and no link has its name."""
@@ -255,11 +255,11 @@ class _Models:
                 raise child.error("models include one another without end", "include", value=self._uri(child))
             self.open.append(path)
             model, version = self._included(child, path)
-        whole = self.flattened(model, version)
+        flat = self.flattened(model, version)
         if child.tag == "include":
             self.open.pop()
         name = model.text("name", "models")
-        return scoped(whole, name, reference_pose(whole), whole.only("pose") or child, merged=merged)
+        return scoped(flat, name, reference_pose(flat), flat.only("pose") or child, merged=merged)
 
     def _included(self, include: Element, path: str) -> tuple[Element, tuple[int, ...]]:
         """Return an included model, with the name, the pose and the static flag of the including element."""

@@ -61,25 +61,25 @@ class Frames:
             self._resolved[name] = self._resolved[self._reference(element)].then(pose_of(element, name))
         return self._resolved[name]
 
-    def of(self, name: str, element: Element, *where: str) -> FramePose:
+    def of(self, name: str, element: Element, *location: str) -> FramePose:
         """Return the pose of a frame in the model; `element` is the one that names the frame."""
-        return self.pose(self._known(name, element, *where))
+        return self.pose(self._known(name, element, *location))
 
-    def link(self, name: str, element: Element, *where: str) -> str:
+    def link(self, name: str, element: Element, *location: str) -> str:
         """Return the link to which a frame is fixed, or ``world``; `element` is the one that names the frame."""
         chain = [name]
         while True:
             name = chain[-1]
             if name == WORLD:
                 return name
-            link_name = self._known(name, element, *where)
+            link_name = self._known(name, element, *location)
             if link_name == MODEL:
                 return self.canonical_link()
             target = self.elements[link_name]
             if target.tag == "link":
                 return link_name
-            following = text_of(target, "child", "joints", name) if target.tag == "joint" else _attachment(target)
-            self._extend(chain, following, target)
+            next_name = text_of(target, "child", "joints", name) if target.tag == "joint" else _attachment(target)
+            self._extend(chain, next_name, target)
 
     def canonical_link(self) -> str:
         """Return the canonical link of the model: the first one, unless it names another."""
@@ -105,13 +105,13 @@ class Frames:
             given = _attachment(element) if element.tag == "frame" else text_of(element, "child")
         return self._known(given, pose or element)
 
-    def _known(self, name: str, element: Element, *where: str) -> str:
+    def _known(self, name: str, element: Element, *location: str) -> str:
         """Return the name of an existing frame; the name of a nested model denotes its own frame."""
         if name == MODEL or name in self.elements:
             return name
-        if (own := f"{name}::{MODEL}") in self.elements:
-            return own
-        raise element.error(no_such("link, joint or frame", name, self.elements), *where, value=name)
+        if (nested := f"{name}::{MODEL}") in self.elements:
+            return nested
+        raise element.error(no_such("link, joint or frame", name, self.elements), *location, value=name)
 
 
 def _attachment(frame: Element) -> str:

@@ -169,17 +169,17 @@ class _Reader:
                 group[head(link)] = head(base)
                 chosen.add(loose.name)
         tree, reached = [], {base}
-        waiting = [joint for joint in joints if joint.name in chosen]
-        while waiting:
-            later = []
-            for joint in waiting:
+        pending = [joint for joint in joints if joint.name in chosen]
+        while pending:
+            deferred = []
+            for joint in pending:
                 if joint.parent in reached or joint.child in reached:
                     outward = joint if joint.parent in reached else joint.reversed()
                     tree.append(outward)
                     reached.add(outward.child)
                 else:
-                    later.append(joint)
-            waiting = later
+                    deferred.append(joint)
+            pending = deferred
         return tree, [joint for joint in joints if joint.name not in chosen]
 
     def _loose(self, link: str, base: str, fixed: bool) -> SdfJoint:
@@ -224,10 +224,10 @@ class _Reader:
             return [Joint(joint.name, joint.parent, child, "fixed")]
         joints = []
         for axis in joint.axes:
-            last = axis is joint.axes[-1]
+            is_last = axis is joint.axes[-1]
             name = self.coordinates.get((joint.name, axis.tag), joint.name)
-            end = child if last else self._unused(f"{joint.name}_frame")
-            if not last:
+            end = child if is_last else self._unused(f"{joint.name}_frame")
+            if not is_last:
                 self.links.append(Link(end))
             bounded = axis.limits.lower is not None or axis.limits.upper is not None
             kind = "prismatic" if joint.kind == "prismatic" else "revolute" if bounded else "continuous"
@@ -242,13 +242,13 @@ class _Reader:
 
     def _screw(self, joint: SdfJoint, turn: Joint, child: str) -> list[Joint]:
         """Return the turn of a screw, and the travel along its axis that follows the turn."""
-        between = self._unused(f"{joint.name}_frame")
-        self.links.append(Link(between))
+        middle = self._unused(f"{joint.name}_frame")
+        self.links.append(Link(middle))
         pitch = pitch_of(joint.element, "joints", joint.name)
         leader = turn.mimic or Mimic(joint.name)
         travel = Mimic(leader.joint, pitch * leader.multiplier, pitch * leader.offset)
-        slide = Joint(self._unused(f"{joint.name}_travel"), between, child, "prismatic", axis=turn.axis, mimic=travel)
-        return [dataclasses.replace(turn, child=between), slide]
+        slide = Joint(self._unused(f"{joint.name}_travel"), middle, child, "prismatic", axis=turn.axis, mimic=travel)
+        return [dataclasses.replace(turn, child=middle), slide]
 
     def _turns(self, joint: SdfJoint, child: str) -> list[Joint]:
         """Return the three turns of a ball, or the six joints of a free link, with unused names."""
@@ -309,14 +309,14 @@ class _Reader:
             name = self.coordinates.get((joint.name, tag), joint.name)
             mimic = needed(joint.element, tag).only("mimic", "joints", joint.name)
             if mimic is not None:
-                where = ("joints", name, "mimic")
-                leader = self._leader(mimic, *where)
+                location = ("joints", name, "mimic")
+                leader = self._leader(mimic, *location)
                 factor, offset, reference = (
-                    number_of(mimic, key, *where, default=float(key == "multiplier"))
+                    number_of(mimic, key, *location, default=float(key == "multiplier"))
                     for key in ("multiplier", "offset", "reference")
                 )
                 mimics[name] = Mimic(leader, factor, offset - factor * reference)
-                self.lines.add(mimic, *where)
+                self.lines.add(mimic, *location)
         for joint in tree:
             if (given := joint.element.only(DRAKE_MIMIC, "joints", joint.name)) is not None:
                 self._drake_mimic(joint, given, mimics)
@@ -330,40 +330,40 @@ class _Reader:
 
     def _drake_mimic(self, joint: SdfJoint, mimic: Element, mimics: dict[str, Mimic]) -> None:
         """Add the leader of a joint that Drake states as attributes of an element."""
-        where = ("joints", joint.name, DRAKE_MIMIC)
+        location = ("joints", joint.name, DRAKE_MIMIC)
         if len(joint.axes) != 1 or joint.name in mimics:
             message = "is for a joint of one axis, and one that follows no other already"
-            raise mimic.error(message, *where, value=joint.kind)
+            raise mimic.error(message, *location, value=joint.kind)
         factor, offset = (
-            mimic.number(key, *where, default=float(key == "multiplier")) for key in ("multiplier", "offset")
+            mimic.number(key, *location, default=float(key == "multiplier")) for key in ("multiplier", "offset")
         )
-        mimics[joint.name] = Mimic(mimic.text("joint", *where), factor, offset)
+        mimics[joint.name] = Mimic(mimic.text("joint", *location), factor, offset)
         self.lines.add(mimic, "joints", joint.name, "mimic")
 
-    def _leader(self, mimic: Element, *where: str) -> str:
+    def _leader(self, mimic: Element, *location: str) -> str:
         """Return the leading coordinate of a mimic, about the first or the second axis of a joint."""
-        joint, tag = mimic.text("joint", *where), mimic.attributes.get("axis", AXIS_TAGS[0])
+        joint, tag = mimic.text("joint", *location), mimic.attributes.get("axis", AXIS_TAGS[0])
         if tag != AXIS_TAGS[0] and (joint, tag) not in self.coordinates:
-            raise mimic.error(f"{joint} has no axis of this name", *where, "axis", value=tag)
+            raise mimic.error(f"{joint} has no axis of this name", *location, "axis", value=tag)
         return self.coordinates.get((joint, tag), joint)
 
     def _gearing(self, gear: SdfJoint, tree: Sequence[SdfJoint]) -> tuple[str, Mimic]:
         """Return the follower of a gearbox and its relation: theta_2 = -ratio theta_1 about the axes of the gearbox."""
-        where = ("joints", gear.name)
-        body = needed(gear.element, "gearbox_reference_body", *where)
-        reference = self.frames.link(text_of(gear.element, "gearbox_reference_body", *where), body, *where)
-        needed(gear.element, "gearbox_ratio", *where)
-        ratio = number_of(gear.element, "gearbox_ratio", *where, default=1.0)
+        location = ("joints", gear.name)
+        body = needed(gear.element, "gearbox_reference_body", *location)
+        reference = self.frames.link(text_of(gear.element, "gearbox_reference_body", *location), body, *location)
+        needed(gear.element, "gearbox_ratio", *location)
+        ratio = number_of(gear.element, "gearbox_ratio", *location, default=1.0)
         turned = []
         for link, axis in zip((gear.parent, gear.child), gear.axes, strict=True):
             joint = next((j for j in tree if {j.parent, j.child} == {reference, link}), None)
             if joint is None or joint.kind not in ("revolute", "continuous"):
                 message = f"a gearbox needs a revolute joint between {reference} and {link}, which there is not"
-                raise gear.element.error(message, *where, value=[reference, link])
-            along = float(joint.axes[0].direction @ axis.direction) * (1.0 if joint.parent == reference else -1.0)
-            if abs(abs(along) - 1) > AXIS_TOLERANCE:
+                raise gear.element.error(message, *location, value=[reference, link])
+            sign = float(joint.axes[0].direction @ axis.direction) * (1.0 if joint.parent == reference else -1.0)
+            if abs(abs(sign) - 1) > AXIS_TOLERANCE:
                 message = f"the axis of a gearbox must be that of {joint.name}"
-                raise gear.element.error(message, *where, value=axis.direction.tolist())
-            turned.append((joint.name, math.copysign(1.0, along)))
+                raise gear.element.error(message, *location, value=axis.direction.tolist())
+            turned.append((joint.name, math.copysign(1.0, sign)))
         (first, sign_1), (second, sign_2) = turned
         return second, Mimic(first, -ratio * sign_1 * sign_2)

@@ -63,7 +63,7 @@ def made(like: Element, tag: str, text: str = "", **attributes: str) -> Element:
 
 
 def scoped(
-    model: Element, scope: str, placed: tuple[FramePose, str], at: Element, *, merged: bool = False
+    model: Element, scope: str, placed: tuple[FramePose, str], location: Element, *, merged: bool = False
 ) -> list[Element]:
     """Return the parts of a model with their names in the containing model, and the frame of the model."""
     from scipy.spatial.transform import Rotation
@@ -78,11 +78,11 @@ def scoped(
     pose, relative = placed
     canonical = Frames(model, named(model)).canonical_link()
     numbers = [*pose.position, *Rotation.from_matrix(pose.rotation).as_quat()]
-    where = made(at, "pose", " ".join(map(repr, map(float, numbers))), relative_to=relative or MODEL)
-    where.attributes["rotation_format"] = "quat_xyzw"
-    own = made(at, "frame", name=frame, attached_to=rename(canonical))
-    own.children.append(where)
-    parts = [own]
+    pose_element = made(location, "pose", " ".join(map(repr, map(float, numbers))), relative_to=relative or MODEL)
+    pose_element.attributes["rotation_format"] = "quat_xyzw"
+    attached = made(location, "frame", name=frame, attached_to=rename(canonical))
+    attached.children.append(pose_element)
+    parts = [attached]
     for child in model.children:
         if child.tag in ("pose", "static", "self_collide", "allow_auto_disable", "enable_wind"):
             continue

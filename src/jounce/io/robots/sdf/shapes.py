@@ -46,50 +46,50 @@ def inertia_of_shapes(name: str, link: Element, inertial: Element, frames: Frame
     RobotFileError
         If there is no collision, the inertia of a shape is not computed, or a size is missing or impossible.
     """
-    where = ("links", name, "inertial")
+    location = ("links", name, "inertial")
     collisions = link.every("collision")
     if not collisions:
         message = 'auto="true" takes the inertia from <collision> shapes, and the link has none; write mass and inertia'
-        raise inertial.error(message, *where)
+        raise inertial.error(message, *location)
     for part in (part for tag in ("pose", "inertia") for part in inertial.every(tag)):
         message = 'auto="true" computes the inertia from shapes, and ignores this; leave one of them out'
-        faults.add(OVERWRITTEN, name, part.error(message, *where, part.tag))
+        faults.add(OVERWRITTEN, name, part.error(message, *location, part.tag))
     total = Inertia.total([_of_collision(name, x, inertial, frames, faults) for x in collisions])
-    if inertial.only("mass", *where) is None:
+    if inertial.only("mass", *location) is None:
         return total
-    mass = number_of(inertial, "mass", *where, default=1.0)
+    mass = number_of(inertial, "mass", *location, default=1.0)
     if mass <= 0:
         message = 'must be greater than zero, for auto="true" scales the inertia of the shapes to it'
-        raise needed(inertial, "mass").error(message, *where, "mass", value=mass)
+        raise needed(inertial, "mass").error(message, *location, "mass", value=mass)
     return Inertia(mass, total.center_of_mass, total.tensor * (mass / total.mass), strict=False)
 
 
 def _of_collision(name: str, collision: Element, inertial: Element, frames: Frames, faults: Faults) -> Inertia:
-    where = ("links", name, "collision", collision.attributes.get("name", ""))
-    shapes = needed(collision, "geometry", *where).children
+    location = ("links", name, "collision", collision.attributes.get("name", ""))
+    shapes = needed(collision, "geometry", *location).children
     if len(shapes) != 1 or shapes[0].tag not in SIZES:
         tag = shapes[0].tag if shapes else ""
         message = f"the inertia of this shape is not computed (of {', '.join(SIZES)} it is); write mass and inertia"
-        raise (shapes[0] if shapes else collision).error(message, *where, value=f"<{tag}>" if tag else None)
+        raise (shapes[0] if shapes else collision).error(message, *location, value=f"<{tag}>" if tag else None)
     shape = shapes[0]
     sizes: dict[str, Any] = {}
     for key, (tag, factor) in SIZES[shape.tag].items():
-        part = needed(shape, tag, *where)
-        values = np.array(part.content_numbers(3 if key == "size" else 1, *where, tag)) * factor
+        part = needed(shape, tag, *location)
+        values = np.array(part.content_numbers(3 if key == "size" else 1, *location, tag)) * factor
         sizes[key] = values if key == "size" else float(values[0])
-    given = next((x for x in (collision.only("density", *where), inertial.only("density", *where)) if x), None)
+    given = next((x for x in (collision.only("density", *location), inertial.only("density", *location)) if x), None)
     if given is None and inertial.first("mass") is None:
         message = f"no density is given, and SDF takes {DENSITY:g} kg/m^3; give <density>"
-        faults.add(DEFAULT_DENSITY, name, collision.error(message, *where))
-    density = DENSITY if given is None else given.content_numbers(1, *where, "density")[0]
+        faults.add(DEFAULT_DENSITY, name, collision.error(message, *location))
+    density = DENSITY if given is None else given.content_numbers(1, *location, "density")[0]
     try:
-        own = Inertia.solid(shape.tag, density=density, **sizes)
+        solid = Inertia.solid(shape.tag, density=density, **sizes)
     except RobotError as error:
-        raise shape.error(error.message, *where, error.name or "", value=error.value) from None
+        raise shape.error(error.message, *location, error.name or "", value=error.value) from None
     middle = np.array([0.0, 0.0, -sizes["length"] / 4]) if shape.tag == "cone" else np.zeros(3)
-    pose = collision.only("pose", *where)
+    pose = collision.only("pose", *location)
     relative = "" if pose is None else pose.attributes.get("relative_to") or pose.attributes.get("frame") or ""
-    at = pose_of(collision, *where)
+    placement = pose_of(collision, *location)
     if relative not in ("", name):
-        at = frames.of(relative, pose or collision).seen_from(frames.pose(name)).then(at)
-    return own.moved(middle, HERE.rotation).moved(*at)
+        placement = frames.of(relative, pose or collision).seen_from(frames.pose(name)).then(placement)
+    return solid.moved(middle, HERE.rotation).moved(*placement)

@@ -100,12 +100,12 @@ def urdf_closures(root: Element, links: Collection[str]) -> list[Loop]:
         where = ("closures", name)
         frames = []
         for body, point in (("A", "AP"), ("B", "BQ")):
-            at = _needed(element, f"{BALL}_p_{point}", *where)
-            named = _needed(element, f"{BALL}_body_{body}", *where)
-            position = at.numbers("value", 3, *where, at.tag)
+            location = _needed(element, f"{BALL}_p_{point}", *where)
+            body_name = _needed(element, f"{BALL}_body_{body}", *where)
+            position = location.numbers("value", 3, *where, location.tag)
             if position is None:
-                raise at.error(f"<{at.tag}> has no attribute value", *where)
-            frames.append((_known(named, "name", links, *where, named.tag), position, [0.0] * 3))
+                raise location.error(f"<{location.tag}> has no attribute value", *where)
+            frames.append((_known(body_name, "name", links, *where, body_name.tag), position, [0.0] * 3))
         loops.append(_made(element, name, "ball", frames, None))
     return loops + [loop for element in gazebo_joints(root) if (loop := gazebo_loop(element, links)) is not None]
 
@@ -130,11 +130,11 @@ def gazebo_loop(element: Element, links: Collection[str]) -> Loop | None:
     ends = [part.content.strip() for role in ("child", "parent") for part in element.every(role)]
     axis = element.first("axis")
     xyz = None if axis is None else axis.first("xyz")
-    elsewhere = (xyz is not None and bool(xyz.attributes)) or (
+    is_displaced = (xyz is not None and bool(xyz.attributes)) or (
         axis is not None and axis.first("use_parent_model_frame")
     )
     relative = any(pose.attributes for pose in element.every("pose"))
-    if not name or kind not in CLOSED_BY or len(ends) != 2 or not set(ends) <= set(links) or elsewhere or relative:
+    if not name or kind not in CLOSED_BY or len(ends) != 2 or not set(ends) <= set(links) or is_displaced or relative:
         return None
     pose, direction = pose_of(element, "closures", name), [0.0, 0.0, 1.0]
     if xyz is not None:

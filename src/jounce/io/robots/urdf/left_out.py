@@ -98,24 +98,24 @@ def rotors(root: Element, faults: Faults) -> dict[str, float]:
             if rotor is None:
                 continue
             name = transmission.attributes.get("name") or actuator.attributes.get("name") or "transmission"
-            where = ("transmissions", name)
-            inertia = rotor.number("value", *where, ROTOR)
-            ratio = 1.0 if gear is None else gear.number("value", *where, RATIO)
+            location = ("transmissions", name)
+            inertia = rotor.number("value", *location, ROTOR)
+            ratio = 1.0 if gear is None else gear.number("value", *location, RATIO)
             if gear is None and (reduction := _reduction(transmission)) is not None:
                 message = f"give <drake:gear_ratio>, by the square of which the rotor counts; {LEAVE.format('it')}"
                 faults.leave_out(
-                    REDUCTIONS, name, reduction.error(message, *where, reduction.tag, value=reduction.content)
+                    REDUCTIONS, name, reduction.error(message, *location, reduction.tag, value=reduction.content)
                 )
             if inertia < 0:
-                raise rotor.error("must be zero or greater", *where, ROTOR, value=inertia)
+                raise rotor.error("must be zero or greater", *location, ROTOR, value=inertia)
             if inertia == 0:
                 continue
             if len(actuators) != 1 or len(joints) != 1:
-                faults.leave_out(ROTORS, name, rotor.error(left_out(ROTORS), *where, ROTOR, value=inertia))
+                faults.leave_out(ROTORS, name, rotor.error(left_out(ROTORS), *location, ROTOR, value=inertia))
                 continue
-            joint = joints[0].text("name", *where, "joint")
+            joint = joints[0].text("name", *location, "joint")
             if joint not in joint_names:
-                raise joints[0].error(no_such("joint", joint, joint_names), *where, "joint", value=joint)
+                raise joints[0].error(no_such("joint", joint, joint_names), *location, "joint", value=joint)
             inertias[joint] = inertias.get(joint, 0.0) + inertia * ratio**2
     return inertias
 
@@ -155,8 +155,8 @@ def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]],
             _note_dynamics(element, faults)
             _note_soft_limits(element, robot, faults)
         elif element.tag == "gazebo":
-            for heading, shown, part in _of_gazebo(element, elements, robot, names, moving=moving):
-                _leave(faults, heading, shown, part, LEAVE)
+            for heading, label, part in _of_gazebo(element, elements, robot, names, moving=moving):
+                _leave(faults, heading, label, part, LEAVE)
             note_fluids(element, faults)
         elif element.tag == "transmission":
             for part in (part for actuator in element.every("actuator") for part in actuator.children):
@@ -168,18 +168,18 @@ def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]],
             _note_mujoco(element, faults)
 
 
-def _leave(faults: Faults, heading: str, shown: str, element: Element, message: str) -> None:
-    error = element.error(message.format(heading), shown, value=element.content.strip() or f"<{element.tag}>")
-    faults.leave_out(heading, shown, error)
+def _leave(faults: Faults, heading: str, label: str, element: Element, message: str) -> None:
+    error = element.error(message.format(heading), label, value=element.content.strip() or f"<{element.tag}>")
+    faults.leave_out(heading, label, error)
 
 
 def _note_dynamics(joint: Element, faults: Faults) -> None:
     """Record the extensions of simulators in the dynamics of a joint."""
     dynamics, name = joint.first("dynamics"), joint.attributes["name"]
     for key, heading in OF_DYNAMICS.items() if dynamics is not None and joint.attributes["type"] != "fixed" else ():
-        where = ("joints", name, "dynamics", key)
-        if dynamics is not None and (value := dynamics.numbers(key, 1, *where, infinite=True)) not in (None, [0.0]):
-            faults.leave_out(heading, name, dynamics.error(left_out(heading), *where, value=value))
+        location = ("joints", name, "dynamics", key)
+        if dynamics is not None and (value := dynamics.numbers(key, 1, *location, infinite=True)) not in (None, [0.0]):
+            faults.leave_out(heading, name, dynamics.error(left_out(heading), *location, value=value))
 
 
 def _note_soft_limits(joint: Element, robot: Robot, faults: Faults) -> None:
@@ -187,9 +187,9 @@ def _note_soft_limits(joint: Element, robot: Robot, faults: Faults) -> None:
     soft, name = joint.first("safety_controller"), joint.attributes["name"]
     if soft is None or name not in robot.joints:
         return
-    where = ("joints", name, "safety_controller")
+    location = ("joints", name, "safety_controller")
     low, high = (
-        (soft.numbers(f"soft_{end}_limit", 1, *where, infinite=True) or [0.0])[0] for end in ("lower", "upper")
+        (soft.numbers(f"soft_{end}_limit", 1, *location, infinite=True) or [0.0])[0] for end in ("lower", "upper")
     )
     limits = robot.joints[name].limits
     lower, upper = (
@@ -197,7 +197,7 @@ def _note_soft_limits(joint: Element, robot: Robot, faults: Faults) -> None:
         math.inf if limits.upper is None else limits.upper,
     )
     if low < high and (low > lower or high < upper):
-        error = soft.error(LEAVE.format(SOFT_LIMITS), *where, value=[low, high])
+        error = soft.error(LEAVE.format(SOFT_LIMITS), *location, value=[low, high])
         faults.leave_out(SOFT_LIMITS, f"{name} from {low:g} to {high:g}", error)
 
 
@@ -213,13 +213,13 @@ def _note_control(control: Element, joints: Mapping[str, Element], robot: Robot,
             continue
         limits = robot.joints[name].limits
         velocity, effort = ((None, None) if x is None else (-x, x) for x in (limits.velocity, limits.effort))
-        known = {"position": (limits.lower, limits.upper), "velocity": velocity, "effort": effort}
+        bounds = {"position": (limits.lower, limits.upper), "velocity": velocity, "effort": effort}
         for command in interface.every("command_interface"):
-            ends = known.get(command.attributes.get("name", ""))
+            ends = bounds.get(command.attributes.get("name", ""))
             for part in command.every("param"):
                 if ends is not None and _is_tighter(part, ends):
-                    shown = f"{name} {command.attributes['name']} {part.attributes['name']} {part.content.strip()}"
-                    _leave(faults, CONTROL_LIMITS, shown, part, LEAVE)
+                    label = f"{name} {command.attributes['name']} {part.attributes['name']} {part.content.strip()}"
+                    _leave(faults, CONTROL_LIMITS, label, part, LEAVE)
 
 
 def _is_tighter(part: Element, ends: tuple[float | None, float | None]) -> bool:
@@ -255,29 +255,29 @@ def _of_gazebo(
     moving: bool,
 ) -> Iterator[tuple[str, str, Element]]:
     """Yield the changes by an element for Gazebo: heading, name of the link or joint, and element."""
-    about = gazebo.attributes.get("reference", "").strip()
-    moves = any(joint.moving for joint in names.get(about, ()))
-    frame = robot.frames.get(about)
+    link = gazebo.attributes.get("reference", "").strip()
+    moves = any(joint.moving for joint in names.get(link, ()))
+    frame = robot.frames.get(link)
     on_moving = frame is not None and frame.body >= 0
     table: dict[str, tuple[str, bool, Callable[[Element], bool]]] = {
-        **dict.fromkeys(SPRINGS, (JOINT_SPRINGS, moves and len(names.get(about, ())) > 1, _counts)),
+        **dict.fromkeys(SPRINGS, (JOINT_SPRINGS, moves and len(names.get(link, ())) > 1, _counts)),
         "gravity": (WEIGHT, on_moving, lambda x: x.content.strip() in NO),
         "turnGravityOff": (WEIGHT, on_moving, lambda x: x.content.strip() in YES),
         "kinematic": (KINEMATIC, on_moving, lambda x: x.content.strip() in YES),
-        "static": (STATIC, moving and not about, lambda x: x.content.strip() in YES),
+        "static": (STATIC, moving and not link, lambda x: x.content.strip() in YES),
         "dampingFactor": (DECAY, on_moving, _counts),
         "velocity_decay": (DECAY, on_moving, lambda x: any(map(_counts, x.children))),
         **dict.fromkeys(LINK_PARTS, (INTO_LINKS, frame is not None, lambda _: True)),
         **(dict.fromkeys(JOINT_PARTS, (INTO_JOINTS, True, lambda _: True)) if moves else {}),
-        "joint": (IN_GAZEBO, not about, lambda x: x.attributes.get("name") not in robot.closures),
-        "link": (IN_GAZEBO, not about, lambda _: True),
+        "joint": (IN_GAZEBO, not link, lambda x: x.attributes.get("name") not in robot.closures),
+        "link": (IN_GAZEBO, not link, lambda _: True),
         "plugin": (PLUGINS, True, lambda x: _followed(x, joints)),
     }
     for part in gazebo.children:
         heading, bears, counts = table.get(part.tag.partition(":")[0], ("", False, _counts))  # <joint:hinge>, once
         if bears and counts(part):
-            shown = about or part.attributes.get("name") or robot.name
-            yield heading, follower(part) if part.tag == "plugin" else shown, part
+            label = link or part.attributes.get("name") or robot.name
+            yield heading, follower(part) if part.tag == "plugin" else label, part
 
 
 def _counts(element: Element) -> bool:

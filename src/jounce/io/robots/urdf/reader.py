@@ -169,24 +169,26 @@ def _distinct(kind: str, parts: list[Any], root: Element) -> dict[str, Any]:
 
 def _link(name: str, element: Element, faults: Faults, gravity: float) -> Link:
     """Return a link; its inertia is transformed from the axes of ``<inertial>`` to those of the link."""
-    where = ("links", name)
-    element.check_children(LINK_PARTS, *where)
-    inertial = element.only("inertial", *where)
+    location = ("links", name)
+    element.check_children(LINK_PARTS, *location)
+    inertial = element.only("inertial", *location)
     if inertial is None:
         return Link(name)
-    inertial.check_children(INERTIAL_PARTS, *where, "inertial")
+    inertial.check_children(INERTIAL_PARTS, *location, "inertial")
     for tag in INERTIAL_PARTS:
-        inertial.only(tag, *where, "inertial")
-    pose = _pose(inertial, *where, "inertial")
-    weight = _part(inertial, "mass", "; give it, or leave out <inertial>", *where, "inertial")
-    mass = weight.number("value", *where, "mass")
+        inertial.only(tag, *location, "inertial")
+    pose = _pose(inertial, *location, "inertial")
+    weight = _part(inertial, "mass", "; give it, or leave out <inertial>", *location, "inertial")
+    mass = weight.number("value", *location, "mass")
     moments = inertial.first("inertia")
     if moments is None:
         message = "has no <inertia>; six zeros are a point mass"
-        faults.add(NO_MOMENTS, name, inertial.error(message, *where, "inertial"))
-    xx, xy, xz, yy, yz, zz = (0.0 if moments is None else moments.number(key, *where, "inertia", key) for key in TENSOR)
+        faults.add(NO_MOMENTS, name, inertial.error(message, *location, "inertial"))
+    xx, xy, xz, yy, yz, zz = (
+        0.0 if moments is None else moments.number(key, *location, "inertia", key) for key in TENSOR
+    )
     if mass < 0:
-        raise weight.error("must be greater than zero", *where, "mass", value=mass)
+        raise weight.error("must be greater than zero", *location, "mass", value=mass)
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if mass == 0 and not tensor.any():
         return Link(name)
@@ -226,25 +228,25 @@ def _parent(joint: Element) -> str:
 
 
 def _check_joint(element: Element, name: str, links: Collection[str]) -> None:
-    where = ("joints", name)
-    element.check_children(JOINT_PARTS, *where)
+    location = ("joints", name)
+    element.check_children(JOINT_PARTS, *location)
     for tag in JOINT_PARTS:
-        element.only(tag, *where)
-    kind = element.text("type", *where, "type")
+        element.only(tag, *location)
+    kind = element.text("type", *location, "type")
     if kind not in TYPES:
-        raise element.error(no_such("joint", kind, TYPES, "type"), *where, "type", value=kind)
+        raise element.error(no_such("joint", kind, TYPES, "type"), *location, "type", value=kind)
     for role in ("parent", "child"):
-        part = _part(element, role, "", *where)
-        link = part.text("link", *where, role)
+        part = _part(element, role, "", *location)
+        link = part.text("link", *location, role)
         if link not in links:
-            raise part.error(no_such("link", link, links), *where, role, value=link)
+            raise part.error(no_such("link", link, links), *location, role, value=link)
     mimic = element.first("mimic")
     if mimic is not None:
-        mimic.text("joint", *where, "mimic")
+        mimic.text("joint", *location, "mimic")
         for key in ("multiplier", "offset"):
-            mimic.numbers(key, 1, *where, "mimic", key)
+            mimic.numbers(key, 1, *location, "mimic", key)
         if kind in EXPANDED:
-            raise mimic.error(f"a {kind} joint has several coordinates, it cannot follow another", *where, "mimic")
+            raise mimic.error(f"a {kind} joint has several coordinates, it cannot follow another", *location, "mimic")
 
 
 def _ends(element: Element) -> tuple[str, str]:
@@ -257,13 +259,13 @@ def _joints(
     name: str, element: Element, mimics: dict[str, Mimic], armature: float, faults: Faults
 ) -> tuple[list[Link], list[Joint]]:
     """Return the joints that represent a joint of the file, with the massless links between them."""
-    where = ("joints", name)
-    kind, (parent, child), (position, rotation) = element.attributes["type"], _ends(element), _pose(element, *where)
+    location = ("joints", name)
+    kind, (parent, child), (position, rotation) = element.attributes["type"], _ends(element), _pose(element, *location)
     axis, limit, dynamics = (element.first(tag) for tag in ("axis", "limit", "dynamics"))
-    direction = [1.0, 0.0, 0.0] if axis is None else axis.numbers("xyz", 3, *where, "axis") or [1.0, 0.0, 0.0]
+    direction = [1.0, 0.0, 0.0] if axis is None else axis.numbers("xyz", 3, *location, "axis") or [1.0, 0.0, 0.0]
     bounds = {key: 0.0 if limit is None else _bound(limit, key, name) for key in (*SIZES, "lower", "upper")}
     damping, friction = (
-        0.0 if dynamics is None else dynamics.number(key, *where, "dynamics", key, default=0.0)
+        0.0 if dynamics is None else dynamics.number(key, *location, "dynamics", key, default=0.0)
         for key in ("damping", "friction")
     )
     if kind == "fixed":
@@ -272,7 +274,7 @@ def _joints(
         if kind in EXPANDED and value:
             heading, dynamics_element = OF_SEVERAL[key], element if dynamics is None or key == "armature" else dynamics
             faults.leave_out(
-                heading, name, dynamics_element.error(left_out(heading), *where, "dynamics", key, value=value)
+                heading, name, dynamics_element.error(left_out(heading), *location, "dynamics", key, value=value)
             )
     if kind in ("floating", "spherical"):
         links, parts = floating_joints(child, prefix=name)
@@ -280,7 +282,7 @@ def _joints(
         first = dataclasses.replace(parts[0], parent=parent, position=position, rotation=rotation)
         return links, [first, *parts[1:]]
     if math.hypot(*direction) < 1e-9:
-        raise (axis or element).error("must have a direction", *where, "axis", value=direction)
+        raise (axis or element).error("must have a direction", *location, "axis", value=direction)
     if kind == "planar":
         return _planar(name, (parent, child), (position, rotation), np.array(direction))
     arguments: dict[str, Any] = {"limits": _limits(name, limit, kind, bounds, faults), "mimic": mimics.get(name)}
@@ -297,13 +299,13 @@ def _mimics(joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
         mimic = joint.first("mimic")
         if mimic is None:
             continue
-        followed = mimic.attributes["joint"]
-        if followed in joints:
+        leader = mimic.attributes["joint"]
+        if leader in joints:
             multiplier, offset = mimic.number("multiplier", default=1.0), mimic.number("offset", default=0.0)
-            mimics[name] = Mimic(followed, multiplier, offset)
+            mimics[name] = Mimic(leader, multiplier, offset)
             continue
-        message = f"must follow a moving joint that follows no other; {did_you_mean(followed, leading)}"
-        faults.add(FOLLOWS_NONE, name, mimic.error(message, "joints", name, "mimic", value=followed))
+        message = f"must follow a moving joint that follows no other; {did_you_mean(leader, leading)}"
+        faults.add(FOLLOWS_NONE, name, mimic.error(message, "joints", name, "mimic", value=leader))
     return leaders(mimics)
 
 

@@ -66,8 +66,8 @@ def read_bag(path: str, joints: Sequence[str] | None = None, topic: str | None =
     except TrajectoryError:
         raise
     except Exception as reason:  # noqa: BLE001 - any error of the reader about a damaged bag
-        words = " ".join(str(reason).split()).encode("ascii", "backslashreplace").decode("ascii")
-        message = f"the bag cannot be read: {words or type(reason).__name__}; {_repair_advice(place)}"
+        text = " ".join(str(reason).split()).encode("ascii", "backslashreplace").decode("ascii")
+        message = f"the bag cannot be read: {text or type(reason).__name__}; {_repair_advice(place)}"
         raise TrajectoryError(message, path=path) from None
     recording = in_sequence(recording)
     return recording if joints is None else recording.renamed(tuple(joints))

@@ -15,51 +15,51 @@ CUT = "..."
 """Text that ``ros2 topic echo`` prints in place of omitted entries."""
 
 
-def joint_names(source: Source, at: Location, own: Any) -> tuple[str, ...]:
+def joint_names(source: Source, location: Location, own: Any) -> tuple[str, ...]:
     """Return a list of different names."""
-    check_whole(source, at, own)
+    check_whole(source, location, own)
     if not isinstance(own, list) or not own or not all(isinstance(name, str) for name in own):
-        raise source.error("must be a list of names", at, value=own)
+        raise source.error("must be a list of names", location, value=own)
     if len(set(own)) < len(own):
-        raise source.error("a joint is named twice", at, value=own)
+        raise source.error("a joint is named twice", location, value=own)
     return tuple(own)
 
 
-def check_whole(source: Source, at: Location, given: Any) -> None:
+def check_whole(source: Source, location: Location, given: Any) -> None:
     """Raise an error if a list was shortened where it was printed."""
     if isinstance(given, list) and CUT in given:
         message = "was cut where it was printed; echo it with --full-length"
-        raise source.error(message, at)
+        raise source.error(message, location)
 
 
-def joint_row(source: Source, at: Location, given: Any, count: int, unknown: bool = False) -> list[float]:
+def joint_row(source: Source, location: Location, given: Any, count: int, unknown: bool = False) -> list[float]:
     """Return a number for each joint; NaN, of what is not measured, only where some may be unknown."""
-    check_whole(source, at, given)
+    check_whole(source, location, given)
     numbers = isinstance(given, list) and all(isinstance(x, int | float) and not isinstance(x, bool) for x in given)
     if not numbers or len(given) != count or not (np.isfinite(given) | (unknown & np.isnan(given))).all():
-        raise source.error(f"must be {count} finite numbers, one for each joint: {at[-1]}", at, value=given)
+        raise source.error(f"must be {count} finite numbers, one for each joint: {location[-1]}", location, value=given)
     return [float(x) for x in given]
 
 
-def seconds_of(source: Source, at: Location, given: Any) -> float:
+def seconds_of(source: Source, location: Location, given: Any) -> float:
     """Return the time of a point since the start, s."""
     if given is None:
         message = (
             "is missing: the time of each point since the start, as {sec: 1, nanosec: 0} or as a number of seconds"
         )
-        raise source.error(message, at)
+        raise source.error(message, location)
     if isinstance(given, int | float) and not isinstance(given, bool) and np.isfinite(given) and given >= 0:
         return float(given)
-    return float(stamp_of(source, at, given))
+    return float(stamp_of(source, location, given))
 
 
-def stamp_of(source: Source, at: Location, given: Any) -> Decimal:
+def stamp_of(source: Source, location: Location, given: Any) -> Decimal:
     """Return a time of ROS 2 or ROS, s, exactly."""
     parts = ("sec", "nanosec") if isinstance(given, Mapping) and "sec" in given else ("secs", "nsecs")
     if not isinstance(given, Mapping) or set(given) - set(parts):
-        raise source.error("must be a time, as {sec: 1, nanosec: 0}", at, value=given)
+        raise source.error("must be a time, as {sec: 1, nanosec: 0}", location, value=given)
     values = [given.get(part, 0) for part in parts]
     for part, value in zip(parts, values, strict=True):
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            raise source.error("must be a whole number, 0 or greater", (*at, part), value=value)
+            raise source.error("must be a whole number, 0 or greater", (*location, part), value=value)
     return Decimal(values[0]) + Decimal(values[1]) / NANO

@@ -46,11 +46,11 @@ def recorded_states(path: str, states: Sequence[State]) -> Recording:
     """
     unstamped = [k for k, state in enumerate(states) if not state.stamp]
     if unstamped and epoch(max(state.stamp for state in states)) is not None:
-        at = unstamped[0]
+        k = unstamped[0]
         message = (
-            f"{len(unstamped)} of {len(states)} messages have no stamp, the first is message {at + 1}; leave them out"
+            f"{len(unstamped)} of {len(states)} messages have no stamp, the first is message {k + 1}; leave them out"
         )
-        raise TrajectoryError(message, path=path, line=states[at].line or None, name="stamp", value=0)
+        raise TrajectoryError(message, path=path, line=states[k].line or None, name="stamp", value=0)
     names = list(dict.fromkeys(name for state in states for name in state.names))
     columns = {name: k for k, name in enumerate(names)}
     values = np.full((len(states), 2, len(names)), np.nan)

@@ -86,44 +86,44 @@ def _trajectories(source: Source) -> Recording:
         if not _is_trajectory(_at(source, location)):
             raise source.error("must hold joint_names and points", location[:2])
     parts = [_points(source, location) for location in locations]
-    whole = parts[0]
+    merged = parts[0]
     for location, part in zip(locations[1:], parts[1:], strict=True):
-        whole = _joined(source, location, whole, part)
+        merged = _joined(source, location, merged, part)
     for location in locations:
-        whole = _without_base(source, location[:-1], whole)
-    return _started(source, whole)
+        merged = _without_base(source, location[:-1], merged)
+    return _started(source, merged)
 
 
-def _without_base(source: Source, at: Location, recording: Recording) -> Recording:
+def _without_base(source: Source, location: Location, recording: Recording) -> Recording:
     """Return a recording with a note about joints of several coordinates that a message moves beside its joints."""
     for key in SEVERAL:
-        moved = _at(source, (*at, key))
+        moved = _at(source, (*location, key))
         if isinstance(moved, dict) and moved.get("points"):
             names = ", ".join(str(name) for name in moved.get("joint_names") or ())
-            place = f"{key}, line {source.line((*at, key))}"
+            place = f"{key}, line {source.line((*location, key))}"
             note = f"the motion of joints of several coordinates is left out: {names} ({place})"
             return dataclasses.replace(recording, notes=(*recording.notes, note))
     return recording
 
 
-def _joined(source: Source, place: Location, first: Recording, then: Recording) -> Recording:
-    same = first.names == then.names and first.values.shape[1] == then.values.shape[1]
-    if not same or np.nanmax(np.abs(first.values[-1, 0] - then.values[0, 0])) > START:
+def _joined(source: Source, place: Location, first: Recording, second: Recording) -> Recording:
+    is_alike = first.names == second.names and first.values.shape[1] == second.values.shape[1]
+    if not is_alike or np.nanmax(np.abs(first.values[-1, 0] - second.values[0, 0])) > START:
         message = "does not start where the trajectory before it ends, with the same joints; keep one of them"
         raise source.error(message, place)
-    if not np.array_equal(first.values[-1], then.values[0], equal_nan=True):
+    if not np.array_equal(first.values[-1], second.values[0], equal_nan=True):
         message = "does not go on with the velocities and accelerations of the trajectory before it; keep one of them"
         raise source.error(message, place)
-    times = np.append(first.times, first.times[-1] + then.times[1:] - then.times[0])
-    lines = [*first.lines, *then.lines[1:]]
-    values = np.concatenate([first.values, then.values[1:]])
+    times = np.append(first.times, first.times[-1] + second.times[1:] - second.times[0])
+    lines = [*first.lines, *second.lines[1:]]
+    values = np.concatenate([first.values, second.values[1:]])
     return Recording(first.path, first.names, times, values, lines, points=True)
 
 
 def _started(source: Source, recording: Recording) -> Recording:
     """Raise an error if a message states that the robot does not start where its trajectory does."""
-    at: Location = ("trajectory_start", "joint_state")
-    state = _at(source, at)
+    location: Location = ("trajectory_start", "joint_state")
+    state = _at(source, location)
     if not is_joint_state(state) or len(state["name"]) != len(state["position"]):
         return recording
     where = dict(zip(state["name"], state["position"], strict=True))
@@ -133,7 +133,7 @@ def _started(source: Source, recording: Recording) -> Recording:
                 f"the robot starts at {where[name]:.9g}, and the trajectory of {name} at "
                 f"{recording.values[0, 0, k]:.9g}: it would jump"
             )
-            raise source.error(message, (*at, "position"))
+            raise source.error(message, (*location, "position"))
     return recording
 
 
@@ -148,21 +148,21 @@ def _at(source: Source, location: Location) -> Any:
     return entry
 
 
-def _points(source: Source, at: Location) -> Recording:
+def _points(source: Source, location: Location) -> Recording:
     """Return the points of the JointTrajectory at a location."""
-    data = _at(source, at)
+    data = _at(source, location)
     for key in data:
         if key not in ("header", "joint_names", "points"):
-            raise source.error("unknown key of a trajectory; valid: header, joint_names, points", (*at, key))
-    names = joint_names(source, (*at, "joint_names"), data["joint_names"])
+            raise source.error("unknown key of a trajectory; valid: header, joint_names, points", (*location, key))
+    names = joint_names(source, (*location, "joint_names"), data["joint_names"])
     points = data["points"]
-    check_whole(source, (*at, "points"), points)
+    check_whole(source, (*location, "points"), points)
     if not isinstance(points, list) or len(points) < 2:
-        raise source.error("must be a list of two points at least", (*at, "points"))
+        raise source.error("must be a list of two points at least", (*location, "points"))
     values = np.full((len(points), len(LEVELS), len(names)), np.nan)
     times, lines = [], []
     for k, point in enumerate(points):
-        place: Location = (*at, "points", k)
+        place: Location = (*location, "points", k)
         if isinstance(point, dict) and "transforms" in point:
             raise source.error(SEVERAL_COORDINATES, place)
         if not isinstance(point, dict) or set(point) - _POINT:

@@ -155,14 +155,16 @@ def _dynamic_states(source: Source) -> Recording:
 
 def _interfaces(source: Source, k: int, j: int) -> dict[str, float]:
     """Return the values of the interfaces of a joint, by name."""
-    at = (k, "interface_values", j)
+    location = (k, "interface_values", j)
     entry = source.data[k]["interface_values"][j]
     if not isinstance(entry, dict) or not {"interface_names", "values"} <= entry.keys():
-        raise source.error("must have interface_names and values", at, value=entry)
-    names = entry["interface_names"] and joint_names(source, (*at, "interface_names"), entry["interface_names"])
+        raise source.error("must have interface_names and values", location, value=entry)
+    names = entry["interface_names"] and joint_names(source, (*location, "interface_names"), entry["interface_names"])
     if not names:
         return {}
-    return dict(zip(names, joint_row(source, (*at, "values"), entry["values"], len(names), unknown=True), strict=True))
+    return dict(
+        zip(names, joint_row(source, (*location, "values"), entry["values"], len(names), unknown=True), strict=True)
+    )
 
 
 def interface_levels(names: Any, values: Any) -> tuple[tuple[str, ...], list[list[float]]]:
