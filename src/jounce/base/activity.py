@@ -86,9 +86,9 @@ def compiling(function: Any) -> Iterator[None]:
 def now() -> Activity | None:
     """Return the current activity; None if there is none."""
     with _lock:
-        counted = _count.activity if _count is not None else None
+        activity = _count.activity if _count is not None else None
         compiled = list(_compiled.values())[-1:]
-    if compiled and (counted is None or not counted.done):
-        before = f"{counted.words}: " if counted else ""
+    if compiled and (activity is None or not activity.done):
+        before = f"{activity.words}: " if activity else ""
         return Activity(f"{before}compiling {compiled[0]}")
-    return counted
+    return activity

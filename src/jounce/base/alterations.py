@@ -50,17 +50,17 @@ def altered() -> str | None:
     True
     """
     note()
-    for name_of, (thing, held, tables) in list(_held.items()):
-        space = dict(vars(thing))
-        for name, value in held.items():
-            if space.get(name) is not value and _counts(thing, name, value):
+    for name_of, (holder, contents, tables) in list(_held.items()):
+        space = dict(vars(holder))
+        for name, value in contents.items():
+            if space.get(name) is not value and _counts(holder, name, value):
                 return f"{name_of}.{name}"
         for name, entries in tables.items():
             if not _same(entries, _entries(space[name])):
                 return f"{name_of}.{name}"
-        if isinstance(thing, type) and len(space) != len(held):
+        if isinstance(holder, type) and len(space) != len(contents):
             for name, value in space.items():
-                if name not in held and _counts(thing, name, value):
+                if name not in contents and _counts(holder, name, value):
                     return f"{name_of}.{name}"
     return None
 
@@ -70,9 +70,9 @@ def _is_begun(module: Any) -> bool:
     return getattr(getattr(module, "__spec__", None), "_initializing", False)
 
 
-def _counts(thing: Any, name: str, value: Any) -> bool:
+def _counts(holder: Any, name: str, value: Any) -> bool:
     """Return whether an entry of a module or class determines its behavior, and is no mere state."""
-    return _acts(value) or name.isupper() or (isinstance(thing, type) and not name.startswith("_"))
+    return _acts(value) or name.isupper() or (isinstance(holder, type) and not name.startswith("_"))
 
 
 def _acts(value: Any) -> bool:
@@ -90,4 +90,4 @@ def _entries(table: Any) -> list[Any]:
 
 
 def _same(before: list[Any], after: list[Any]) -> bool:
-    return len(before) == len(after) and all(one is other for one, other in zip(before, after, strict=True))
+    return len(before) == len(after) and all(a is b for a, b in zip(before, after, strict=True))

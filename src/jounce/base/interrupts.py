@@ -67,9 +67,9 @@ def _done(handled: list[signal.Signals]) -> None:
 
 def _pipe() -> tuple[int, int]:
     """Return a pipe, after closed standard files are opened to the null device, so that no file takes their numbers."""
-    while (nowhere := os.open(os.devnull, os.O_RDWR)) <= 2:
+    while (null_device := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
-    os.close(nowhere)
+    os.close(null_device)
     return os.pipe()
 
 

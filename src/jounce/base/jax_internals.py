@@ -63,9 +63,9 @@ def use_file_cache(make: Callable[[str], tuple[Any, str]]) -> bool:
     """Have JAX store its own programs in the cache that a function returns for a path; return whether that works."""
     from jax._src import compilation_cache
 
-    if known := hasattr(compilation_cache, "get_file_cache"):
+    if is_available := hasattr(compilation_cache, "get_file_cache"):
         compilation_cache.get_file_cache = make
-    return known
+    return is_available
 
 
 def by_certain_entries() -> Any:

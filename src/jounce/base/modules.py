@@ -91,14 +91,14 @@ class _ModuleType(ABCMeta):
                 cls.__init__(module, *arguments, **keywords)
             finally:
                 _being_made.discard(id(module))
-            held = vars(module)
+            namespace = vars(module)
             for name in (*layout.traced, *layout.static):
-                if name not in held and not hasattr(cls, name):
+                if name not in namespace and not hasattr(cls, name):
                     raise TypeError(f"{cls.__qualname__}: __init__ gives the field {name!r} no value")
             for name, converter in layout.converters:
-                held[name] = converter(held[name])
+                namespace[name] = converter(namespace[name])
             for name in layout.static:
-                if isinstance(held.get(name), jax.Array):
+                if isinstance(namespace.get(name), jax.Array):
                     raise TypeError(f"{cls.__qualname__}.{name}: a static field cannot hold an array of JAX")
             for check in layout.checks:
                 check(module)
@@ -132,8 +132,8 @@ def _getter(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
     """Return a function that returns the values of attributes as a tuple."""
     if len(names) > 1:
         return operator.attrgetter(*names)
-    one = operator.attrgetter(*names) if names else None
-    return (lambda _: ()) if one is None else lambda module: (one(module),)
+    getter = operator.attrgetter(*names) if names else None
+    return (lambda _: ()) if getter is None else lambda module: (getter(module),)
 
 
 class Module(metaclass=_ModuleType):
@@ -155,10 +155,10 @@ class Module(metaclass=_ModuleType):
                 return
             kind = type(self).__qualname__
             if id(self) in _being_made:
-                words = f"{kind} has no field {name!r}: declare it in the class, as in `{name}: float`"
+                message = f"{kind} has no field {name!r}: declare it in the class, as in `{name}: float`"
             else:
-                words = f"cannot assign to field {name!r} of {kind}: make a copy by dataclasses.replace"
-            raise dataclasses.FrozenInstanceError(words)
+                message = f"cannot assign to field {name!r} of {kind}: make a copy by dataclasses.replace"
+            raise dataclasses.FrozenInstanceError(message)
 
         def __delattr__(self, name):
             raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r} of {type(self).__qualname__}")
@@ -194,8 +194,8 @@ def _is_same(a: Any, b: Any) -> bool:
     if a is b:
         return True
     if isinstance(a, np.ndarray | np.generic | jax.Array):
-        alike = type(a) is type(b) and a.shape == b.shape and a.dtype == b.dtype
-        return alike and bool((np.asarray(a) == np.asarray(b)).all())
+        is_alike = type(a) is type(b) and a.shape == b.shape and a.dtype == b.dtype
+        return is_alike and bool((np.asarray(a) == np.asarray(b)).all())
     return type(a) is type(b) and bool(a == b)
 
 
@@ -222,10 +222,10 @@ def with_fields(module: M, **values: Any) -> M:
     >>> with_fields(Spring(3.0, 0.1), length=0.2)
     Spring(stiffness=3.0, length=0.2)
     """
-    names, held = field_names(type(module)), vars(module)
+    names, contents = field_names(type(module)), vars(module)
     if not values.keys() <= names:
         raise TypeError(f"{type(module).__name__} has no field {sorted(values.keys() - names)}")
-    own = held if held.keys() <= names else {name: held[name] for name in names if name in held}
+    own = contents if contents.keys() <= names else {name: contents[name] for name in names if name in contents}
     return unchecked(type(module), {**own, **values})
 
 
@@ -309,8 +309,8 @@ def changes_parts(kind: type, general: tuple[type, ...], known: Iterable[str] = 
     """
     if belongs_to_package(kind):
         return False
-    ours = [base for base in kind.__mro__ if belongs_to_package(base) and base not in (*general, Module)]
-    named = {name for base in ours for name in vars(base) if name[:2] != "__" and name[:4] != "_abc"}
+    bases = [base for base in kind.__mro__ if belongs_to_package(base) and base not in (*general, Module)]
+    names = {name for base in bases for name in vars(base) if name[:2] != "__" and name[:4] != "_abc"}
     return any(
-        name in named.difference(known) for base in kind.__mro__ if not belongs_to_package(base) for name in vars(base)
+        name in names.difference(known) for base in kind.__mro__ if not belongs_to_package(base) for name in vars(base)
     )

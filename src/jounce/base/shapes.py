@@ -166,16 +166,18 @@ def _unit_free(values: Any, timed: bool) -> Any:
     unit = getattr(values, "attrs", {}).get("units")  # of labeled arrays
     if isinstance(unit, str) and not _SI.fullmatch(unit.strip()):
         raise _NoNumbersError(f"these are in {unit}: convert them to SI units")
-    bare = getattr(values, "data", values) if unit is not None or hasattr(values, "coords") else values
-    own = getattr(bare, "units", getattr(bare, "unit", None)) if hasattr(bare, "to") else None
-    if own is None or not hasattr(bare, "magnitude" if hasattr(bare, "units") else "value"):
-        return bare
+    data = getattr(values, "data", values) if unit is not None or hasattr(values, "coords") else values
+    given_unit = getattr(data, "units", getattr(data, "unit", None)) if hasattr(data, "to") else None
+    if given_unit is None or not hasattr(data, "magnitude" if hasattr(data, "units") else "value"):
+        return data
     if not timed:
-        raise _NoNumbersError(f"these have the unit {own or 1}: convert them to SI units, and give plain numbers")
+        raise _NoNumbersError(
+            f"these have the unit {given_unit or 1}: convert them to SI units, and give plain numbers"
+        )
     try:
-        in_seconds: Any = bare.to("s")
+        in_seconds: Any = data.to("s")
     except Exception:  # noqa: BLE001 - the errors of libraries of units have no common base
-        raise _NoNumbersError(f"these have the unit {own or 1}, which is not a unit of time") from None
+        raise _NoNumbersError(f"these have the unit {given_unit or 1}, which is not a unit of time") from None
     return in_seconds.magnitude if hasattr(in_seconds, "magnitude") else in_seconds.value
 
 

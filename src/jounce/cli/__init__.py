@@ -121,7 +121,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not re.fullmatch("[1-9][0-9]{0,3}", os.environ.get(name, "1")):  # the meaning of 0 varies
             del os.environ[name]
     as_json = "--json" in given
-    verbose, given = "--verbose" in given, [each for each in given if each != "--verbose"]
+    verbose, given = "--verbose" in given, [word for word in given if word != "--verbose"]
     with failsafe_streams() as output, cautions(json=as_json):
         status = _status(given, as_json, verbose)
         output.flush()
@@ -195,15 +195,15 @@ def _words_of(error: Any) -> str:
     """Return the message for words of the command line that do not fit the command, with the options in question."""
     import cyclopts
 
-    words = " ".join(str(error).split())
+    message = " ".join(str(error).split())
     if isinstance(error, cyclopts.UnusedCliTokensError):
         return f"more words than the command takes: {' '.join(error.unused_tokens or ())}"
     given = error.token.keyword if isinstance(error, cyclopts.UnknownOptionError) else None
     if given and not given.startswith("--"):
         names = [name for each in error.argument_collection for name in each.names]
-        alike = [name for name in names if name.startswith(f"-{given[:2]}")]
-        words += f" Did you mean {' or '.join(alike)}?" if alike else ""
-    return words
+        candidates = [name for name in names if name.startswith(f"-{given[:2]}")]
+        message += f" Did you mean {' or '.join(candidates)}?" if candidates else ""
+    return message
 
 
 def application() -> Any:

@@ -73,8 +73,8 @@ def _kind_of_data(data: Any) -> str | None:
     rows = list(joints.values()) if isinstance(joints, dict) else []
     if rows and all(isinstance(row, dict) and row.keys() <= {*KEYS} for row in rows):
         return "limits"
-    driven = data["drivers"].values() if isinstance(data.get("drivers"), dict) else rows
-    if driven and all(isinstance(row, dict) and row.keys() <= {*OF_DRIVES} for row in driven if row is not None):
+    entries = data["drivers"].values() if isinstance(data.get("drivers"), dict) else rows
+    if entries and all(isinstance(row, dict) and row.keys() <= {*OF_DRIVES} for row in entries if row is not None):
         return "drives"
     if rows and all(isinstance(row, str | int | float) or "samples" in row for row in rows):
         return "trajectory"

@@ -136,8 +136,8 @@ def _show_other_reader(facts: dict[str, Any]) -> None:
 
     show_table(other_reader_table(facts))
     if facts["indices"] is not None:
-        plain = all(factor == 1 for factor in facts["factors"])
-        times = "" if plain else f"{[round(x, 12) for x in facts['factors']]} * "
+        is_identity = all(factor == 1 for factor in facts["factors"])
+        times = "" if is_identity else f"{[round(x, 12) for x in facts['factors']]} * "
         print_text(f"\n  velocities of {facts['name']} = {times}ours[{facts['indices']}]")
     if facts["note"]:
         print_text(f"\n  {facts['note']}")

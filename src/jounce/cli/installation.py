@@ -77,8 +77,8 @@ def _machine_code() -> dict[str, str]:
         usable = is_usable() and uses_machine_code()
     if usable:
         return {"machine code": "used"}
-    why = str(caught[0].message) if caught else "llvmlite is not installed, or an accelerator computes"
-    return {"machine code": f"not used: {why}"}
+    reason = str(caught[0].message) if caught else "llvmlite is not installed, or an accelerator computes"
+    return {"machine code": f"not used: {reason}"}
 
 
 def _program_folder() -> dict[str, str]:
@@ -143,8 +143,8 @@ def _tests() -> dict[str, float]:
     from jounce.robot import Inertia, inverse_dynamics
     from jounce.robot.construct import JointAxis, from_screws
 
-    def error(value: Any, right: Any) -> float:
-        return float((np.abs(value - right).max(axis=0) / np.abs(right).max(axis=0)).max())
+    def error(value: Any, expected: Any) -> float:
+        return float((np.abs(value - expected).max(axis=0) / np.abs(expected).max(axis=0)).max())
 
     time, rate = np.linspace(0.0, 1.0, 201), 3.0
     crank = Mechanism(
@@ -155,8 +155,8 @@ def _tests() -> dict[str, float]:
         outputs={"tip": PointOutput("crank", [0.1, 0.0])},
     )
     order = np.arange(5)
-    right = 0.1 * rate**order * np.cos(rate * time[:, None] + order * np.pi / 2)
-    tip = error(solve(crank, time, order=4).outputs["tip"][..., 0], right)
+    expected = 0.1 * rate**order * np.cos(rate * time[:, None] + order * np.pi / 2)
+    tip = error(solve(crank, time, order=4).outputs["tip"][..., 0], expected)
 
     pendulum = from_screws([JointAxis([0, 1, 0], inertia=Inertia(2.0, [0.5, 0, 0]))])
     q = np.stack([np.sin(time), np.cos(time), -np.sin(time), -np.cos(time)], axis=1)[..., None]

@@ -273,13 +273,13 @@ class Heading:
         return True if self.header_units else False if self.plain_header else None
 
 
-def units_chosen(known: ShownUnits, texts: Sequence[str] | None) -> ShownUnits:
+def units_chosen(file_units: ShownUnits, texts: Sequence[str] | None) -> ShownUnits:
     """Return the units of a file, overridden by those of the option --units."""
     from jounce.units.shown_units import units_given
 
     given = units_given(texts or ())
     try:
-        return known.merged(given)
+        return file_units.merged(given)
     except JounceError as error:
         error.name = f"--units {str(error.name).removeprefix('units.')}"
         raise
@@ -339,15 +339,15 @@ def errors_about(file: Path, robot: Path | None = None) -> Iterator[None]:
     try:
         yield
     except JounceError as error:
-        option, _, rest = str(error.name or "").partition(" ")
+        option, _, remainder = str(error.name or "").partition(" ")
         if option in OPTIONS:
-            error.name = f"--{RENAMED.get(option, option).replace('_', '-')} {rest}".rstrip()
+            error.name = f"--{RENAMED.get(option, option).replace('_', '-')} {remainder}".rstrip()
             raise
         about_robot = robot is not None and isinstance(error, RobotError)
         raise error.located(path=robot if about_robot else file) from None
 
 
-def positive_quantity(option: str, text: str, dimensions: Collection[Dimension], words: str) -> float:
+def positive_quantity(option: str, text: str, dimensions: Collection[Dimension], noun: str) -> float:
     """Return the positive number in a text, in SI units; its unit, if any, must have one of the dimensions."""
     from jounce.units.values import parse_value
 
@@ -360,7 +360,7 @@ def positive_quantity(option: str, text: str, dimensions: Collection[Dimension],
     except JounceError as error:
         raise error.located(name=option, value=text) from None
     if quantity.dimension is not None and quantity.dimension not in dimensions:
-        raise UnitError(f"must be {words}", name=option, value=text)
+        raise UnitError(f"must be {noun}", name=option, value=text)
     if not isinstance(quantity.value, float) or quantity.value <= 0:
         raise JounceError("must be greater than zero", name=option, value=text)
     return quantity.value

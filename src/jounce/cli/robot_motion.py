@@ -52,8 +52,8 @@ class RobotRun:
 
     def given(self) -> list[str]:
         """Return the names of the given options."""
-        plain = RobotRun()
-        return [name for name in self.__dataclass_fields__ if getattr(self, name) != getattr(plain, name)]
+        defaults = RobotRun()
+        return [name for name in self.__dataclass_fields__ if getattr(self, name) != getattr(defaults, name)]
 
     def time(self) -> Any:
         """Return the instants.

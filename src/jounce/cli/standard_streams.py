@@ -59,9 +59,9 @@ class FailSafeStream:
                 self.failure = error
             self._stream = None
             with suppress(OSError, ValueError, AttributeError):  # otherwise the interpreter tries again at exit
-                nowhere = os.open(os.devnull, os.O_WRONLY)
-                os.dup2(nowhere, self._given.fileno())
-                os.close(nowhere)
+                null_device = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(null_device, self._given.fileno())
+                os.close(null_device)
 
     def __getattr__(self, name: str) -> Any:
         if self._given is None:

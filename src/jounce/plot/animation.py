@@ -163,8 +163,8 @@ def animate(
     check_animation(path, overwrite=overwrite)
     path_lines, solved = paths_of(motion, paths, order, view), solved_instants(motion)
     nearest = nearest_instants(motion.time, frame_instants(motion.time, speed=speed, fps=fps))
-    shown = nearest[np.isin(nearest, solved)]
-    instants, frames = np.unique(shown if shown.size else solved, return_inverse=True)
+    selected = nearest[np.isin(nearest, solved)]
+    instants, frames = np.unique(selected if selected.size else solved, return_inverse=True)
     scene, mechanism = scene_of(motion, view=view, instants=instants), motion.mechanism
     program: dict[Any, Any] = {}
     if Path(fspath(path)).suffix.lower() == ".gif":
@@ -204,7 +204,7 @@ def _even_pixels(figure: Any) -> None:
     figure.set_size_inches(*(size + 1e-6))
 
 
-def _clock_text(time: Float[np.ndarray, " time"], now: float) -> str:
+def _clock_text(time: Float[np.ndarray, " time"], instant: float) -> str:
     duration = abs(float(time[-1] - time[0])) or 1.0
     digits = max(0, 2 - int(np.floor(np.log10(duration))))
-    return f"t = {now:.{min(digits, 9)}f} s"
+    return f"t = {instant:.{min(digits, 9)}f} s"

@@ -165,8 +165,8 @@ def finish(axes: Any, motion: Motion, scaled: Float[np.ndarray, "time *lines"]) 
     if len(time) > 1:
         axes.set_xlim(time[0], time[-1])
     for run in unsolved_runs(motion):
-        begin, end = max(run[0] - 1, 0), min(run[-1] + 1, len(time) - 1)
-        axes.axvspan(time[begin], time[end], color="#EEEEEE", linewidth=0, zorder=0)
+        start, end = max(run[0] - 1, 0), min(run[-1] + 1, len(time) - 1)
+        axes.axvspan(time[start], time[end], color="#EEEEEE", linewidth=0, zorder=0)
 
 
 def check_figure(path: str | PathLike[str], *, overwrite: bool = False) -> None:

@@ -92,9 +92,9 @@ def draw_reactions(motion: Motion, names: Sequence[str] | None = None) -> Figure
     columns = {name: (output, motion.evaluate(output).values) for name, output in reactions.items()}
     sizes = {name: _largest(values[:, 0]) for name, (_, values) in columns.items()}
     moments = {name for name, output in reactions.items() if isinstance(output, loads.JointTorqueOutput)}
-    least = NOTHING * skeleton(mechanism).size * max(size for name, size in sizes.items() if name not in moments)
-    felt = {name: column for name, column in columns.items() if name not in moments or sizes[name] > least}
-    return draw_columns(motion, felt)
+    threshold = NOTHING * skeleton(mechanism).size * max(size for name, size in sizes.items() if name not in moments)
+    significant = {name: column for name, column in columns.items() if name not in moments or sizes[name] > threshold}
+    return draw_columns(motion, significant)
 
 
 def _largest(values: Float[np.ndarray, "..."]) -> float:
@@ -172,19 +172,19 @@ def draw_power(motion: Motion) -> Figure:
     """
     balance = power_balance(motion)
     rows = min(balance.sizes["derivative"], max(motion.order - 1, 1))
-    named = [name for name in WORDS if _largest(balance[name].values[:, 0])] or list(WORDS)  # all if none has power
+    kinds = [name for name in WORDS if _largest(balance[name].values[:, 0])] or list(WORDS)  # all if none has power
     with style():
         figure = blank_figure(PANEL[0], PANEL[1] * rows + 0.9, motion.mechanism.title)
         panels = np.atleast_1d(figure.subplots(rows, 1, sharex=True))
         for order, axes in enumerate(panels):
-            powers = {name: balance[name].values[:, order] for name in named}
+            powers = {name: balance[name].values[:, order] for name in kinds}
             word = ("power", "rate", "second rate", "third rate")[order] if order < 4 else f"rate {order}"
             _draw_lines(axes, motion, powers, word, ("W", order))
         panels[-1].set_xlabel("time  $t$  (s)")
         figure.align_ylabels()
         handles, labels = panels[0].get_legend_handles_labels()
-        words = [WORDS[label] for label in labels]
-        figure.legend(handles, words, loc="outside lower center", ncols=min(len(words), 2))
+        legends = [WORDS[label] for label in labels]
+        figure.legend(handles, legends, loc="outside lower center", ncols=min(len(legends), 2))
     return figure
 
 

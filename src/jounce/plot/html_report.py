@@ -135,11 +135,13 @@ def _data(motion: Motion, view: View, file: str | PathLike[str]) -> dict[str, An
     mechanism, source = motion.mechanism, Path(file).name
     parameters = parameter_facts(mechanism, file if source and Path(file).is_file() else None)
     rising = np.argsort(motion.time, kind="stable")
-    shown = evenly_chosen(rising, MOST_INSTANTS)
-    time = motion.time[shown]
+    selected = evenly_chosen(rising, MOST_INSTANTS)
+    time = motion.time[selected]
     start, stop = float(time[0]), float(time[-1])
     units = mechanism.shown_units
-    outputs = [_output(name, mechanism.outputs[name], values[shown], units) for name, values in motion.outputs.items()]
+    outputs = [
+        _output(name, mechanism.outputs[name], values[selected], units) for name, values in motion.outputs.items()
+    ]
     of_values = "Outputs in the units shown, the rest" if mechanism.units else "All values"
     lines = motion_summary(motion_facts(motion), source or "mechanism").splitlines()
     return {
@@ -148,7 +150,7 @@ def _data(motion: Motion, view: View, file: str | PathLike[str]) -> dict[str, An
         "made": f"Made by jounce {__version__}{f' from {source}' if source else ''}. {of_values} in SI units.",
         "messages": _messages(motion),
         "times": time.tolist(),
-        "solved": (np.asarray(motion.status)[shown] == 0).tolist(),
+        "solved": (np.asarray(motion.status)[selected] == 0).tolist(),
         "start": start,
         "stop": stop,
         "digits": min(9, max(0, 3 - math.floor(math.log10(stop - start)))) if stop > start else 3,
@@ -156,7 +158,7 @@ def _data(motion: Motion, view: View, file: str | PathLike[str]) -> dict[str, An
         "speeds": [[value, f"{value:g} x"] for value in SPEEDS],
         "levels": [derivative_name(k) for k in range(1 + max([motion.order, *(len(o["words"]) - 1 for o in outputs)]))],
         "outputs": outputs,
-        "scene": _scene(motion, rising, shown, view, [output["name"] for output in outputs]),
+        "scene": _scene(motion, rising, selected, view, [output["name"] for output in outputs]),
         "peaks": [_peak(peak) for peak in shown_peaks(peaks(motion), units)],
         "parameters": [
             [row["name"], _number(row["value"]), row["unit"] or "", row["written"] or ""] for row in parameters
@@ -205,8 +207,8 @@ def _output(
 def _peak(peak: Peak) -> dict[str, Any]:
     facts = {name: getattr(peak, name) for name in ("output", "derivative", "unit")}
     times = {name: _number(getattr(peak, name)) for name in ("minimum_at", "maximum_at")}
-    shown = dict(zip(("minimum", "maximum"), map(_number, peak.shown), strict=True))
-    return facts | times | shown | {"largest": list(peak.largest)}
+    values = dict(zip(("minimum", "maximum"), map(_number, peak.shown), strict=True))
+    return facts | times | values | {"largest": list(peak.largest)}
 
 
 def _messages(motion: Motion) -> list[str]:
@@ -215,9 +217,9 @@ def _messages(motion: Motion) -> list[str]:
     for run in unsolved_runs(motion):
         first, last = motion.time[run[0]], motion.time[run[-1]]
         when = f"t = {first:g} s" if len(run) == 1 else f"t = {first:g} s to {last:g} s"
-        known = Status(int(motion.status[run[0]]))
+        status = Status(int(motion.status[run[0]]))
         fault = motion.faults.get(int(run[0]), "")
-        lines.append(f"Not solved at {when}{f' ({fault})' if fault else ''}: {known.advice}.")
+        lines.append(f"Not solved at {when}{f' ({fault})' if fault else ''}: {status.advice}.")
     return lines
 
 
@@ -234,7 +236,7 @@ def _bodies(mechanism: Mechanism) -> list[dict[str, Any]]:
 def _scene(
     motion: Motion,
     rising: Int[np.ndarray, " time"],
-    shown: Int[np.ndarray, " shown"],
+    selected: Int[np.ndarray, " shown"],
     view: View,
     outputs: list[str],
 ) -> dict[str, Any]:
@@ -278,7 +280,7 @@ def _scene(
             for number, label in enumerate(labels)
         ],
         "paths": [
-            {"output": outputs.index(name), "points": pixels(flat[shown])}
+            {"output": outputs.index(name), "points": pixels(flat[selected])}
             for name, flat in (paths.flat.items() if paths else ())
         ],
     }

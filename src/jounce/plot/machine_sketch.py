@@ -89,9 +89,9 @@ def limits_with(scene: Scene, paths: Paths | None) -> tuple[float, float, float,
     """Return the left, right, lower and upper end of a scene and its paths, m."""
     left, right, lower, upper = scene.limits
     for flat in paths.flat.values() if paths else ():
-        known = flat[np.isfinite(flat).all(axis=1)]
-        if len(known):
-            (low_x, low_y), (high_x, high_y) = known.min(axis=0).tolist(), known.max(axis=0).tolist()
+        finite = flat[np.isfinite(flat).all(axis=1)]
+        if len(finite):
+            (low_x, low_y), (high_x, high_y) = finite.min(axis=0).tolist(), finite.max(axis=0).tolist()
             left, lower, right, upper = min(left, low_x), min(lower, low_y), max(right, high_x), max(upper, high_y)
     return left, right, lower, upper
 
@@ -133,11 +133,11 @@ class SketchFigure:
         draw_scale(axes, self.extent, view)
 
     @staticmethod
-    def _blank(wide: float, tall: float, bar: float, title: str) -> Any:
+    def _blank(width: float, height: float, bar: float, title: str) -> Any:
         """Return the axes of an empty figure for a width and height, m, and a color bar beside it, inches."""
-        scale = min((WIDEST - 0.3) / wide, (TALLEST - 0.3) / tall)
-        least = max(LEAST, min(LETTER * len(title), WIDEST_TITLE))
-        size = max(least, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
+        scale = min((WIDEST - 0.3) / width, (TALLEST - 0.3) / height)
+        minimum = max(LEAST, min(LETTER * len(title), WIDEST_TITLE))
+        size = max(minimum, width * scale + 0.3 + bar), max(LEAST, height * scale + 0.3 + 0.35 * bool(title))
         return blank_figure(*size, title).add_subplot()
 
     def _artist(self, shape: Shape) -> Any:
@@ -190,13 +190,13 @@ class SketchFigure:
                 text.remove()
                 continue
             anchor = label.anchor[0]
-            at = to_pixels.inverted().transform(to_pixels.transform(anchor) + place.offset(half, unit))
-            text.set_position(at)
-            self.texts.append((text, label, at - anchor))
+            position = to_pixels.inverted().transform(to_pixels.transform(anchor) + place.offset(half, unit))
+            text.set_position(position)
+            self.texts.append((text, label, position - anchor))
             if place.led and fixed:
                 look = {"color": label.color, "linewidth": 0.5, "alpha": 0.6, "zorder": 5.5}
-                begin = anchor + 1.2 * self.scene.unit * np.array(place.direction)  # at the rim of a pin
-                axes.plot([begin[0], at[0]], [begin[1], at[1]], **look)
+                start = anchor + 1.2 * self.scene.unit * np.array(place.direction)  # at the rim of a pin
+                axes.plot([start[0], position[0]], [start[1], position[1]], **look)
 
     def _placed_renderer(self) -> Any:
         """Lay out all panels, and return the renderer, which measures texts."""
@@ -265,9 +265,9 @@ def sketch(
     else:
         path_lines, solved = paths_of(moving, paths, order, view), solved_instants(moving)
         shown_instants = np.array([moving.time[solved[0]] if instant is None else instant])
-        at = solved[nearest_instants(moving.time[solved], shown_instants)[0]]
-        chosen = np.union1d(evenly_chosen(solved, MOST), at)  # rails cover the whole motion
-        scene = scene_of(moving, view=view, instants=chosen).only(int(np.searchsorted(chosen, at)))
+        index = solved[nearest_instants(moving.time[solved], shown_instants)[0]]
+        chosen = np.union1d(evenly_chosen(solved, MOST), index)  # rails cover the whole motion
+        scene = scene_of(moving, view=view, instants=chosen).only(int(np.searchsorted(chosen, index)))
     with style():
         figure = SketchFigure(scene, path_lines, mechanism.title, None if mechanism.space == "planar" else view)
         figure.show(0)

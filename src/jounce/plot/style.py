@@ -87,5 +87,5 @@ def printable(text: str) -> str:
 
 def shown_name(name: str) -> str:
     """Return a name escaped for matplotlib, so that dollar signs show, and truncated if very long."""
-    short = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 3]}..."
-    return printable(short).replace("$", r"\$")
+    label = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 3]}..."
+    return printable(label).replace("$", r"\$")

@@ -39,8 +39,8 @@ class RunningMaxima:
     def add(self, time: Times, values: Curves, scales: Float[np.ndarray, " curves"]) -> None:
         """Add the next chunk."""
         self.scales = scales if self._ends is None else np.maximum(self.scales, scales)
-        top, every = largest_indices(self._rounded(local_heights(values)), 1)[0], np.arange(values.shape[1])
-        largest = values[top, every]
+        top, columns = largest_indices(self._rounded(local_heights(values)), 1)[0], np.arange(values.shape[1])
+        largest = values[top, columns]
         if self._ends is None:
             self.times, self.sizes = time[top], largest
         else:
@@ -75,9 +75,9 @@ class RunningMaxima:
             time[np.minimum(index + 1, len(time) - 1)],
         ]
         if self._maxima:
-            both = [np.concatenate(pair) for pair in zip(self._maxima, candidates, strict=True)]
-            order = np.argsort(-self._rounded(both[0]), axis=0, kind="stable")[: self._count]
-            candidates = [np.take_along_axis(x, order, axis=0) for x in both]
+            joined = [np.concatenate(pair) for pair in zip(self._maxima, candidates, strict=True)]
+            order = np.argsort(-self._rounded(joined[0]), axis=0, kind="stable")[: self._count]
+            candidates = [np.take_along_axis(x, order, axis=0) for x in joined]
         return candidates
 
     def _rounded(self, heights: Curves) -> Curves:

@@ -34,10 +34,10 @@ def _moving(end: TrajectoryEnd) -> str:
         return "at rest"
     word, values = ("velocities", end.velocities) if end.velocities else ("accelerations", end.accelerations)
     largest = sorted(values.items(), key=lambda entry: -abs(entry[1]))
-    listed = ", ".join(f"{name} {value:.4g}" for name, value in largest[:SHOWN])
-    more = f" and {len(largest) - SHOWN} more" if len(largest) > SHOWN else ""
-    how = "in motion" if end.velocities else "at rest, but with acceleration"
-    return f"{how}: {listed}{more}, {UNITS[word]},"
+    phrase = ", ".join(f"{name} {value:.4g}" for name, value in largest[:SHOWN])
+    ellipsis = f" and {len(largest) - SHOWN} more" if len(largest) > SHOWN else ""
+    state = "in motion" if end.velocities else "at rest, but with acceleration"
+    return f"{state}: {phrase}{ellipsis}, {UNITS[word]},"
 
 
 def breaks_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
@@ -46,12 +46,12 @@ def breaks_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
     for end in ends:
         if not end.breaks:
             continue
-        by: dict[str, list[str]] = {}
+        owners_of: dict[str, list[str]] = {}
         for owner, quantity in end.breaks:
-            by.setdefault(quantity, []).append(owner)
-        listed = "; ".join(f"{quantity} of {', '.join(owners)}" for quantity, owners in by.items())
+            owners_of.setdefault(quantity, []).append(owner)
+        phrase = "; ".join(f"{quantity} of {', '.join(owners)}" for quantity, owners in owners_of.items())
         jump = "from rest" if end.end == "start" else "to rest"
-        lines.append(f"infinite by the jump {jump} at the {end.end}: {listed}")
+        lines.append(f"infinite by the jump {jump} at the {end.end}: {phrase}")
     return lines
 
 
@@ -79,10 +79,10 @@ def between_facts(trajectory: JointTrajectory) -> Mapping[str, Any] | None:
     by_words = {words: None for law in trajectory.laws.values() if (words := _words(law)) is not None}
     if not by_words:
         return None
-    away, joint, at = 0.0, None, None
+    deviation, joint, at = 0.0, None, None
     if all(sampled(law) is not None for law in trajectory.laws.values()):
-        away, joint, at = _largest_deviation(trajectory)
-    return {"words": "; ".join(by_words), "deviation": away, "joint": joint, "at": at}
+        deviation, joint, at = _largest_deviation(trajectory)
+    return {"words": "; ".join(by_words), "deviation": deviation, "joint": joint, "at": at}
 
 
 def _words(law: object) -> str | None:
@@ -101,23 +101,23 @@ def _largest_deviation(trajectory: JointTrajectory) -> tuple[float, str | None, 
     """Return the largest distance of laws from straight lines between samples, with its joint and instant."""
     lines = lines_of(trajectory)
     assert lines is not None
-    share = np.arange(1, LOOKS) / LOOKS
-    at = (lines.at[:-1, None] + np.diff(lines.at)[:, None] * share).reshape(-1)
+    fractions = np.arange(1, LOOKS) / LOOKS
+    at = (lines.at[:-1, None] + np.diff(lines.at)[:, None] * fractions).reshape(-1)
     positions = np.stack([polynomials_at(law, at) for law in trajectory.laws.values()], axis=1)  # type: ignore[arg-type]
-    away = lines.distances(at, positions)
-    k = int(np.argmax(away))
-    if not away[k] > 0:
+    deviations = lines.distances(at, positions)
+    k = int(np.argmax(deviations))
+    if not deviations[k] > 0:
         return 0.0, None, None
-    own = np.stack([np.interp(at[k], lines.at, column) for column in lines.points.T])
-    return float(away[k]), lines.names[int(np.argmax(np.abs(positions[k] - own)))], float(at[k])
+    points = np.stack([np.interp(at[k], lines.at, column) for column in lines.points.T])
+    return float(deviations[k]), lines.names[int(np.argmax(np.abs(positions[k] - points)))], float(at[k])
 
 
 def between_words(trajectory: JointTrajectory) -> list[str]:
     """Return the assumed motion between the points of a trajectory in words; empty if its laws define it."""
     if isinstance(trajectory, SmoothedTrajectory):
-        away = max(joint.away for joint in trajectory.joints.values())
+        deviation = max(joint.away for joint in trajectory.joints.values())
         bound = f"within {trajectory.deviation:.3g} rad or m of each of {len(trajectory.times)} samples"
-        return [f"smoothed {bound}, at most {away:.2g} from them"]
+        return [f"smoothed {bound}, at most {deviation:.2g} from them"]
     facts = between_facts(trajectory)
     if facts is None:
         return []

@@ -161,14 +161,14 @@ def _mechanism(mechanism: Mechanism) -> list[str]:
 def _motion(motion: Motion) -> list[str]:
     facts = motion_facts(motion)
     time = facts["time"]
-    solved = f"{time['solved']} of {count(time['count'], 'instant')} solved"
-    line = f"{solved}, t = {interval_text(time['start'], time['stop'])}, order {facts['order']}"
+    phrase = f"{time['solved']} of {count(time['count'], 'instant')} solved"
+    line = f"{phrase}, t = {interval_text(time['start'], time['stop'])}, order {facts['order']}"
     lines = _title(facts["title"] or "Motion", line)
     if facts["failures"]:
-        first = facts["failures"][0]
-        fault = f" ({first['fault']})" if first["fault"] else ""
-        word = first["status"].lower().replace("_", " ")
-        text = _text(f"t = {time_text(first['time'])} s: {word}{fault}")
+        failure = facts["failures"][0]
+        fault = f" ({failure['fault']})" if failure["fault"] else ""
+        word = failure["status"].lower().replace("_", " ")
+        text = _text(f"t = {time_text(failure['time'])} s: {word}{fault}")
         lines.append(f'<p class="bad">{text}</p>')
     if "steps" in facts:
         text = [facts["mobility"], count(facts["steps"], "step")]
@@ -188,14 +188,14 @@ def _equilibrium(rest: Equilibrium) -> list[str]:
     return [*_title(rest.mechanism.title or "Equilibrium", *lines), *_tables(equilibrium_tables(rest))]
 
 
-def _linearization(small: Linearization) -> list[str]:
-    where = "a motion" if small.equilibrium is None else f"an equilibrium that is {small.equilibrium.stability}"
-    title = _title(small.mechanism.title or "Small motions", f"about {where} at t = {time_text(small.time)} s")
+def _linearization(model: Linearization) -> list[str]:
+    place = "a motion" if model.equilibrium is None else f"an equilibrium that is {model.equilibrium.stability}"
+    title = _title(model.mechanism.title or "Small motions", f"about {place} at t = {time_text(model.time)} s")
     tables = []
-    for name, matrix in (("Mass", small.mass), ("Damping", small.damping), ("Stiffness", small.stiffness)):
-        rows = [[c, *map(number, row)] for c, row in zip(small.coordinates, matrix.tolist(), strict=True)]
-        tables.append(Table(f"{name} (SI)", ("", *small.coordinates), rows, range(1, len(rows) + 1)))
-    return [*title, *_tables([*tables, modes_table(small.modes)])]
+    for name, matrix in (("Mass", model.mass), ("Damping", model.damping), ("Stiffness", model.stiffness)):
+        rows = [[c, *map(number, row)] for c, row in zip(model.coordinates, matrix.tolist(), strict=True)]
+        tables.append(Table(f"{name} (SI)", ("", *model.coordinates), rows, range(1, len(rows) + 1)))
+    return [*title, *_tables([*tables, modes_table(model.modes)])]
 
 
 def _robot(robot: Robot) -> list[str]:
@@ -226,24 +226,24 @@ def _assemblies(assemblies: Assemblies) -> list[str]:
     headings = ("assembly", "circuit", "branch", "found from", "distance", "least singular value")
     rows = [
         [
-            str(each.number),
-            *("-" if part is None else str(part) for part in (each.circuit, each.branch)),
-            count(each.hits, "start"),
-            number(each.distance),
-            number(each.smallest_singular_value),
+            str(assembly.number),
+            *("-" if part is None else str(part) for part in (assembly.circuit, assembly.branch)),
+            count(assembly.hits, "start"),
+            number(assembly.distance),
+            number(assembly.smallest_singular_value),
         ]
-        for each in assemblies
+        for assembly in assemblies
     ]
     return [*_title(repr(assemblies).strip("<>")), *_tables([Table("", headings, rows, range(4, 6))])]
 
 
-def _tool_path_motion(moved: ToolPathMotion) -> list[str]:
-    orders = ("position", "velocity", "acceleration", "jerk")[: moved.q.shape[1]]
+def _tool_path_motion(motion: ToolPathMotion) -> list[str]:
+    orders = ("position", "velocity", "acceleration", "jerk")[: motion.q.shape[1]]
     rows = [
-        [name, *(_range(moved.q[:, order, k]) for order in range(len(orders)))]
-        for k, name in enumerate(moved.robot.joint_names)
+        [name, *(_range(motion.q[:, order, k]) for order in range(len(orders)))]
+        for k, name in enumerate(motion.robot.joint_names)
     ]
-    title = _title(repr(moved).strip("<>"), moved.ending)
+    title = _title(repr(motion).strip("<>"), motion.ending)
     return [*title, *_tables([Table("Ranges", ("joint", *(f"{word}, SI" for word in orders)), rows)])]
 
 
@@ -262,13 +262,13 @@ def _ranges(dataset: Any) -> Table:
 
 
 def _range(values: np.ndarray) -> str:
-    known = values[np.isfinite(values)]
-    return f"{number(known.min())} to {number(known.max())}" if known.size else "-"
+    finite = values[np.isfinite(values)]
+    return f"{number(finite.min())} to {number(finite.max())}" if finite.size else "-"
 
 
 def _batch(batch: Batch) -> list[str]:
-    whole = (batch.status == Status.OK).all(axis=1)
-    line = f"{int(whole.sum())} of {count(len(whole), 'run')} complete, {count(len(batch.time), 'instant')}"
+    is_complete = (batch.status == Status.OK).all(axis=1)
+    line = f"{int(is_complete.sum())} of {count(len(is_complete), 'run')} complete, {count(len(batch.time), 'instant')}"
     parameters = [[name, number(x.min()), number(x.max())] for name, x in batch.parameters.items()]
     outputs = []
     for name, values in batch.outputs.items():

@@ -72,8 +72,8 @@ class Peak:
     @property
     def largest(self) -> tuple[bool, bool]:
         """Whether the minimum and the maximum have the largest magnitude; both if they differ only by rounding."""
-        low, high, near = abs(self.minimum), abs(self.maximum), ALIKE * self.size
-        return self.varies and low >= high - near, self.varies and high >= low - near
+        low, high, margin = abs(self.minimum), abs(self.maximum), ALIKE * self.size
+        return self.varies and low >= high - margin, self.varies and high >= low - margin
 
 
 def derivative_name(order: int) -> str:
@@ -86,8 +86,8 @@ def derivative_name(order: int) -> str:
     """
     if order < len(NAMES):
         return NAMES[order]
-    last = order % 10 if order // 10 % 10 != 1 else 0
-    return str(order) + {1: "st", 2: "nd", 3: "rd"}.get(last, "th")
+    digit = order % 10 if order // 10 % 10 != 1 else 0
+    return str(order) + {1: "st", 2: "nd", 3: "rd"}.get(digit, "th")
 
 
 def rate_name(output: AbstractQuantity, order: int) -> str:
@@ -183,8 +183,8 @@ def table_peaks(dataset: xarray.Dataset, one_sided: xarray.Dataset | None = None
     times = np.concatenate([x["time"].values for x in (dataset, one_sided) if x is not None])
     for name, variable in dataset.data_vars.items():
         unit = variable.attrs["units"]
-        both = (variable, *(() if one_sided is None else (one_sided[name],)))
-        for order, given in enumerate(np.concatenate([x.transpose(*coords).values for x in both]).T):
+        variables = (variable, *(() if one_sided is None else (one_sided[name],)))
+        for order, given in enumerate(np.concatenate([x.transpose(*coords).values for x in variables]).T):
             values, instants = (x[np.isfinite(given)] for x in (given, times))
             size = float(np.abs(values).max(initial=0.0))
             low = high = (np.nan, np.nan)
@@ -208,14 +208,14 @@ def shown_peaks(given: Sequence[Peak], units: ShownUnits) -> list[Peak]:
     >>> shown_peaks([Peak("C_x", "velocity", "m/s", -0.5, 0.0, 2.0, 1.0, 2.0)], units)[0].minimum
     -500.0
     """
-    shown = []
+    selected = []
     for peak in given:
         stem = peak.output.rpartition("_")[0]
         name = stem if peak.output not in units.outputs and stem in units.outputs else peak.output
         unit, factor = units.of(peak.unit, name)
         sizes = {key: getattr(peak, key) * factor for key in ("minimum", "maximum", "size")}
-        shown.append(dataclasses.replace(peak, unit=unit, **sizes))
-    return shown
+        selected.append(dataclasses.replace(peak, unit=unit, **sizes))
+    return selected
 
 
 def effort_name(unit: str, order: int) -> str:
@@ -272,22 +272,22 @@ def _extremes(
     """
     times, sizes = maxima.times.copy(), maxima.sizes.copy()
     rounding = ROUNDING * maxima.scales
-    changed = _has_changed(motion)
+    has_changed = _has_changed(motion)
     breaks, sides, one_sided = _one_sided(motion)
-    if len(sides) and not changed:
+    if len(sides) and not has_changed:
         _keep_best(times, sizes, 0.0, np.repeat(breaks[:, None], len(sizes), axis=1), one_sided)
-    if refine and len(motion.time) > 1 and not changed:
+    if refine and len(motion.time) > 1 and not has_changed:
         low, high = _around_maxima(motion, maxima)
-        share = np.linspace(0.0, 1.0, POINTS)[:, None, None]
-        best, near = (low.copy(), np.full(low.shape, -np.inf)), []
+        fractions = np.linspace(0.0, 1.0, POINTS)[:, None, None]
+        best, neighbors = (low.copy(), np.full(low.shape, -np.inf)), []
         for _ in range(ROUNDS):
-            around = low + share * (high - low)
-            own = _own(motion, around)
-            _keep_best(*best, 0.0, around, own)
-            top = np.clip(np.argmax(own, axis=0), 1, POINTS - 2)
-            near = [np.take_along_axis(own, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 0, 1)]
+            around = low + fractions * (high - low)
+            values = _own(motion, around)
+            _keep_best(*best, 0.0, around, values)
+            top = np.clip(np.argmax(values, axis=0), 1, POINTS - 2)
+            neighbors = [np.take_along_axis(values, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 0, 1)]
             low, high = (np.take_along_axis(around, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 1))
-        vertex = _vertex(low, high, *near)[None]
+        vertex = _vertex(low, high, *neighbors)[None]
         _keep_best(*best, 0.0, vertex, _own(motion, vertex))
         equal = best[1] >= best[1].max(axis=0) - rounding
         first = np.argmin(np.where(equal, best[0], np.inf), axis=0)[None]
@@ -302,8 +302,8 @@ def _has_changed(motion: Motion | ChunkedMotion) -> bool:
     if type(motion) is not Motion or not len(motion.time) or not holds_users_code(elements):
         return False
     sample = np.unique(np.linspace(0, len(motion.time) - 1, COMPARED).astype(int))
-    now, then = _at(motion, motion.time[sample]), _curves(motion)[sample]
-    return not alike(now, then)
+    current, stored = _at(motion, motion.time[sample]), _curves(motion)[sample]
+    return not alike(current, stored)
 
 
 def _one_sided(motion: Motion | ChunkedMotion) -> tuple[Times, Times, Curves]:
@@ -311,13 +311,13 @@ def _one_sided(motion: Motion | ChunkedMotion) -> tuple[Times, Times, Curves]:
     if not len(motion.time):
         return np.zeros(0), np.zeros(0), np.zeros((0, 0))
     first, last = sorted((float(motion.time[0]), float(motion.time[-1])))  # a simulation may go backward
-    lost = lost_orders(motion.mechanism.outputs.values())
+    extra_order = lost_orders(motion.mechanism.outputs.values())
     forces = isinstance(motion, Simulation) or None  # forces determine the motion of all bodies
-    breaks = breaks_of_laws(motion.mechanism, first, last, motion.order + lost, forces=forces)
+    breaks = breaks_of_laws(motion.mechanism, first, last, motion.order + extra_order, forces=forces)
     if isinstance(motion, Simulation):
         breaks = np.unique(np.concatenate([breaks, [time for time, _ in motion.kinks]]))
-    sides, which = both_sides(breaks, first, last)
-    return breaks[which], sides, _at(motion, sides) if len(sides) else np.zeros((0, 0))
+    sides, indices = both_sides(breaks, first, last)
+    return breaks[indices], sides, _at(motion, sides) if len(sides) else np.zeros((0, 0))
 
 
 def _around_maxima(motion: Motion | ChunkedMotion, maxima: RunningMaxima) -> tuple[Peaks, Peaks]:
@@ -333,17 +333,17 @@ def _around_maxima(motion: Motion | ChunkedMotion, maxima: RunningMaxima) -> tup
 def _denser(motion: Motion, steps: int) -> tuple[Float[np.ndarray, " denser"], Float[np.ndarray, "denser curves"]]:
     """Return instants and curves with a number of steps between instants, so that only needle-like peaks are missed."""
     time = motion.time
-    between = (time[:-1, None] + np.diff(time)[:, None] * np.arange(1, steps) / steps).ravel()
-    whole = np.concatenate([time, between])
-    order = np.argsort(whole)
-    return whole[order], np.concatenate([_curves(motion), _at(motion, between)])[order]
+    inserted = (time[:-1, None] + np.diff(time)[:, None] * np.arange(1, steps) / steps).ravel()
+    all_times = np.concatenate([time, inserted])
+    order = np.argsort(all_times)
+    return all_times[order], np.concatenate([_curves(motion), _at(motion, inserted)])[order]
 
 
-def _own(motion: Motion | ChunkedMotion, around: _Around) -> _Around:
+def _own(motion: Motion | ChunkedMotion, times: _Around) -> _Around:
     """Return the values of each curve at its own instants, (points, peaks, curves)."""
-    instants, inverse = np.unique(around, return_inverse=True)
+    instants, inverse = np.unique(times, return_inverse=True)
     values = _at(motion, instants)
-    return values[inverse.reshape(around.shape), np.arange(around.shape[-1])]
+    return values[inverse.reshape(times.shape), np.arange(times.shape[-1])]
 
 
 def _at(motion: Motion | ChunkedMotion, instants: Times) -> Curves:
@@ -354,18 +354,18 @@ def _at(motion: Motion | ChunkedMotion, instants: Times) -> Curves:
         if isinstance(motion, Simulation):
             parts.append(_curves(motion.at(chunk)))
             continue
-        whole = np.unique(np.append(chunk, motion.time[0]))  # with the same start, to stay on the same branch
+        chunk_times = np.unique(np.append(chunk, motion.time[0]))  # with the same start, to stay on the same branch
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SampleWarning)  # the first solution of the motion has warned
-            solved = solve(motion.mechanism, whole, motion.order, strict=False)
-        parts.append(_curves(solved)[np.searchsorted(whole, chunk)])
+            solved = solve(motion.mechanism, chunk_times, motion.order, strict=False)
+        parts.append(_curves(solved)[np.searchsorted(chunk_times, chunk)])
     return np.concatenate(parts)
 
 
 def _curves(motion: Motion) -> Curves:
     """Return all derivatives of all outputs, negated and as they are, (time, 2 curves); -inf where unknown."""
-    whole = np.concatenate([values for _, values in scalar_outputs(motion).values()], axis=1)
-    return np.nan_to_num(np.concatenate([-whole, whole], axis=1), nan=-np.inf, posinf=-np.inf, neginf=-np.inf)
+    columns = np.concatenate([values for _, values in scalar_outputs(motion).values()], axis=1)
+    return np.nan_to_num(np.concatenate([-columns, columns], axis=1), nan=-np.inf, posinf=-np.inf, neginf=-np.inf)
 
 
 def _scales(motion: Motion) -> Float[np.ndarray, " curves"]:
@@ -382,18 +382,18 @@ def _keep_best(
     sizes: Float[np.ndarray, "*curves"],
     rounding: Float[np.ndarray, " curves"] | float,
     around: Float[np.ndarray, "points *curves"],
-    own: Float[np.ndarray, "points *curves"],
+    values: Float[np.ndarray, "points *curves"],
 ) -> None:
     """Replace maxima by values that are larger by more than rounding, so that requested instants are preferred."""
-    time, size = (np.take_along_axis(x, np.argmax(own, axis=0)[None], axis=0)[0] for x in (around, own))
+    time, size = (np.take_along_axis(x, np.argmax(values, axis=0)[None], axis=0)[0] for x in (around, values))
     with np.errstate(invalid="ignore"):
-        better = size > sizes + rounding
-    times[better], sizes[better] = time[better], size[better]
+        is_better = size > sizes + rounding
+    times[is_better], sizes[is_better] = time[is_better], size[is_better]
 
 
-def _vertex(low: Peaks, high: Peaks, *near: Peaks) -> Peaks:
+def _vertex(low: Peaks, high: Peaks, *points: Peaks) -> Peaks:
     """Return the vertex of the parabola through three evenly spaced values, between the outer two."""
-    left, middle, right = near
+    left, middle, right = points
     with np.errstate(invalid="ignore", divide="ignore"):
         shift = 0.5 * (left - right) / (left - 2 * middle + right)
     shift = np.where(np.isfinite(shift), np.clip(shift, -1.0, 1.0), 0.0)

@@ -132,8 +132,8 @@ class _NotebookLine:
 
     def show(self, activity: Activity) -> None:
         bar = "" if activity.total is None else f'<progress value="{activity.done}" max="{activity.total}"></progress> '
-        words = f"{html.escape(activity.words)} {_counts(activity)} {time.monotonic() - self._started:.0f} s"
-        self._handle.update(self._html(f"{bar}{words}"))
+        phrase = f"{html.escape(activity.words)} {_counts(activity)} {time.monotonic() - self._started:.0f} s"
+        self._handle.update(self._html(f"{bar}{phrase}"))
 
     def close(self) -> None:
         self._handle.update(self._html(""))

@@ -28,8 +28,8 @@ def binding_facts(retimed: RetimedTrajectory) -> list[dict[str, Any]]:
     hundredth of it.
     """
     active = retimed.active
-    at = active["time"].values
-    weights = np.gradient(at)
+    times = active["time"].values
+    weights = np.gradient(times)
     rows = [
         {
             "limit": str(name),
@@ -62,15 +62,15 @@ def retimed_words(
     retimed: RetimedTrajectory, before: float | None, free: float, files: list[str], read: LimitReport | None
 ) -> str:
     """Return the summary of a retimed trajectory: its duration, and that it keeps its limits."""
-    was = "" if before is None else f", {before:.6g} s before"
-    what = "joint" if retimed.report.held or len(retimed.report.values[0, 0]) else "driver"
-    lines = [f"{retimed.report.robot}: {count(len(retimed.names), what)} ({', '.join(files)})", f"{free:.6g} s{was}"]
+    change = "" if before is None else f", {before:.6g} s before"
+    noun = "joint" if retimed.report.held or len(retimed.report.values[0, 0]) else "driver"
+    lines = [f"{retimed.report.robot}: {count(len(retimed.names), noun)} ({', '.join(files)})", f"{free:.6g} s{change}"]
     if read is not None:
         lines.append(
             f"written: {retimed.stop:.6g} s in {len(retimed.times)} rows; splines through them keep the limits too "
             f"({100 * (retimed.stop / free - 1):.2f} % slower)"
         )
-    if what == "joint" and any(row.unit.startswith("N") for row in retimed.report.limited):
+    if noun == "joint" and any(row.unit.startswith("N") for row in retimed.report.limited):
         lines.append(f"torques: {drives_note(retimed.report.drives)}")
     lines += [*path_words(retimed.path), *ends_words(retimed.report.ends)]
     lines += load_words(retimed.report)
@@ -90,8 +90,8 @@ def path_words(path: JointPath) -> list[str]:
         return [f"path: {path.words}; at most {path.deviation:.2g} from them"]
     if path.words:
         bound = "" if path.allowed is None else f" ({path.allowed:.3g} allowed)"
-        away = f"at most {path.deviation:.2g} rad or m{bound}"
-        return [f"path: {path.words}; {away} from the straight lines between them"]
+        deviation = f"at most {path.deviation:.2g} rad or m{bound}"
+        return [f"path: {path.words}; {deviation} from the straight lines between them"]
     if path.deviation > NEGLIGIBLE:
         return [f"path: within {path.deviation:.1e} rad or m of the given trajectory"]
     return []

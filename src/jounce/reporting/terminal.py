@@ -163,10 +163,10 @@ def print_error(error: object, *, json: bool = False) -> None:
     _write_message("error", "bold red", error, json)
 
 
-def detail(words: str, *, json: bool = False) -> None:
+def detail(phrase: str, *, json: bool = False) -> None:
     """Print a detail of an error on standard error in one line; with JSON, nothing is printed."""
     if not json:
-        _write_message("note", "bold", words, json)
+        _write_message("note", "bold", phrase, json)
 
 
 def print_warning(warning: object, *, json: bool = False) -> None:
@@ -183,11 +183,11 @@ def recorded_cautions(caught: Sequence[warnings.WarningMessage], *, json: bool =
 @contextmanager
 def cautions(*, json: bool = False) -> Iterator[None]:
     """Print warnings like the errors of the command, each once and without its place in the code."""
-    shown: set[str] = set()
+    messages: set[str] = set()
 
     def show(message: Any, *_: Any, **__: Any) -> None:
-        if str(message) not in shown:
-            shown.add(str(message))
+        if str(message) not in messages:
+            messages.add(str(message))
             print_warning(message, json=json)
 
     with warnings.catch_warnings():

@@ -51,5 +51,5 @@ def _poles(sizes: Float[np.ndarray, "point side distance component"]) -> Bool[np
     """Return whether a magnitude grows like a pole: by the same factor from each distance to the next."""
     with np.errstate(invalid="ignore", divide="ignore"):
         growth = sizes[:, :, 1:] / sizes[:, :, :-1]
-        alike = np.abs(growth / growth[:, :, -1:] - 1.0) < LIKENESS
-    return np.any(((growth > POLE) & alike).all(axis=2), axis=-1)
+        are_constant = np.abs(growth / growth[:, :, -1:] - 1.0) < LIKENESS
+    return np.any(((growth > POLE) & are_constant).all(axis=2), axis=-1)

@@ -64,7 +64,7 @@ class JointReport:
 
     def __str__(self) -> str:
         lines = [f"{self.kind.__qualname__} keeps: {', '.join(self.held)}"]
-        return "\n".join([*lines, *(f"{name}: {why}" for name, why in self.left_out.items())])
+        return "\n".join([*lines, *(f"{name}: {reason}" for name, reason in self.left_out.items())])
 
 
 def check_joint(
@@ -162,7 +162,7 @@ def check_joint(
         check_name("field", name, facts_of(kind).signs, MechanismError, name="values")
     samples = Samples(kind, space, dict(values or {}), optional, bodies)
     subject = Subject(samples, order, relative, period, equations, seed)
-    held, left_out = [], {}
+    fulfilled, left_out = [], {}
     for name in chosen:
         try:
             CONTRACTS[name](subject)
@@ -171,5 +171,5 @@ def check_joint(
         except SkippedContract as reason:
             left_out[name] = str(reason)
         else:
-            held.append(name)
-    return JointReport(kind, tuple(held), MappingProxyType(left_out))
+            fulfilled.append(name)
+    return JointReport(kind, tuple(fulfilled), MappingProxyType(left_out))

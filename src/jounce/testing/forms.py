@@ -32,8 +32,8 @@ def copies(subject: Subject) -> None:
     element = subject.samples.element(subject.random())
     vectors = (name for name, kind in field_kinds(type(element)).items() if kind == "vector")
     given = {name: tuple(value) for name in vectors if (value := getattr(element, name)) is not None}
-    several = (name for name, kind in field_kinds(type(element)).items() if kind == "points")
-    given |= {name: tuple(map(tuple, getattr(element, name))) for name in several}
+    names = (name for name, kind in field_kinds(type(element)).items() if kind == "points")
+    given |= {name: tuple(map(tuple, getattr(element, name))) for name in names}
     element = dataclasses.replace(element, **given)  # lists have no hash
     copies_made = {"copy.copy": copy.copy(element), "copy.deepcopy": copy.deepcopy(element)}
     kind = type(element)

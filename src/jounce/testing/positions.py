@@ -47,29 +47,29 @@ def rank(subject: Subject) -> None:
 def facts(subject: Subject) -> None:
     """Check the facts that the class states: directions held parallel, a squared distance, a pair, dimensions."""
     element = _sample(subject)
-    stated, group = facts_of(type(element)), group_of([element], subject.space)
+    declared, group = facts_of(type(element)), group_of([element], subject.space)
     positions = _positions(subject, group)
     for motion, _ in positions:
         _held_parallel(group, motion)
-        if stated.point_distance and not stated.pair:
-            _point_distance(group, motion, stated.point_distance)
-        if stated.pair:
+        if declared.point_distance and not declared.pair:
+            _point_distance(group, motion, declared.point_distance)
+        if declared.pair:
             _is_pair(subject, element, motion)
         _dimensions(subject, element, motion)
-    if stated.squared_distance:
+    if declared.squared_distance:
         _squared_distance(subject, element)
 
 
 def _sample(subject: Subject) -> Any:
     """Return a random joint; directions that must not be parallel are perpendicular to each other."""
     element = subject.samples.element(subject.random())
-    changed = {}
+    variant = {}
     for name, other in facts_of(type(element)).never_parallel:
         vector, axis = getattr(element, name), getattr(element, other)
         if vector is not None and axis is not None and name not in subject.samples.given:
             vector, axis = np.asarray(vector, float), np.asarray(axis, float)
-            changed[name] = (vector - axis * (vector @ axis) / (axis @ axis)).tolist()
-    return dataclasses.replace(element, **changed)
+            variant[name] = (vector - axis * (vector @ axis) / (axis @ axis)).tolist()
+    return dataclasses.replace(element, **variant)
 
 
 def _positions(subject: Subject, group: Group) -> list[tuple[Motion, np.ndarray]]:
@@ -93,9 +93,9 @@ def _closed(subject: Subject, group: Group, motion: Motion) -> tuple[Motion, np.
     """Return a position near a given one where a joint holds, by Gauss-Newton, or None."""
     unit = directions(subject.space)
     unknowns = np.stack([np.zeros_like(unit), unit])
-    still = Jet.constant(jnp.full((1, unit.shape[-1]), INSTANT), 1)
+    clock = Jet.constant(jnp.full((1, unit.shape[-1]), INSTANT), 1)
     for k in range(STEPS + 1):
-        values = evaluated(group, with_unknowns(motion, unknowns), still)[..., 0, :]
+        values = evaluated(group, with_unknowns(motion, unknowns), clock)[..., 0, :]
         gap, slopes = values[0, :, 0], values[1]
         if not np.isfinite(values).all():
             return None
@@ -103,9 +103,9 @@ def _closed(subject: Subject, group: Group, motion: Motion) -> tuple[Motion, np.
         size = float(np.abs(step).max())
         if size <= (CLOSED if k < STEPS else NEARLY):
             return motion, slopes
-        along = step * min(1.0, 0.5 / size)
-        whole = np.tensordot(unit, along, axes=1)[..., None]
-        motion = displaced(motion, whole)
+        direction = step * min(1.0, 0.5 / size)
+        shift = np.tensordot(unit, direction, axes=1)[..., None]
+        motion = displaced(motion, shift)
         if "quaternion" in motion:
             motion["quaternion"][0] /= np.linalg.norm(motion["quaternion"][0], axis=0)
     return None
@@ -127,7 +127,7 @@ def _held_parallel(group: Group, motion: Motion) -> None:
             )
 
 
-def _point_distance(group: Group, motion: Motion, stated: str) -> None:
+def _point_distance(group: Group, motion: Motion, fact: str) -> None:
     """Check the distance between the points of a joint that holds."""
     pose = pose_of(motion)
     first, second = (
@@ -135,9 +135,9 @@ def _point_distance(group: Group, motion: Motion, stated: str) -> None:
         for name, bodies in zip(("point_i", "point_j"), group.bodies[:2], strict=True)
     )
     distance = float(np.linalg.norm(second - first))
-    expected = 0.0 if stated == "zero" else float(np.squeeze(getattr(group.element, stated)))
+    expected = 0.0 if fact == "zero" else float(np.squeeze(getattr(group.element, fact)))
     if abs(distance - abs(expected)) > 1e-10 * max(1.0, abs(expected)):
-        raise Broken(f"point_distance {stated!r}: where the joint holds, its points are {distance:.6g} m apart")
+        raise Broken(f"point_distance {fact!r}: where the joint holds, its points are {distance:.6g} m apart")
 
 
 def _is_pair(subject: Subject, element: Any, motion: Motion) -> None:
@@ -147,9 +147,9 @@ def _is_pair(subject: Subject, element: Any, motion: Motion) -> None:
     values = {name: getattr(element, name, None) for name in field_kinds(kind)}
     if pair == "prismatic" and values["vector_j"] is None:
         raise SkippedContract("a prismatic pair without vector_j is not compared with that of the library")
-    known = group_of([kind(element.bodies, **values)], subject.space)
-    subject.same(residual(known, motion)[0], 0 * residual(known, motion)[0], 1e-11, f"pair {pair}: it does not hold")
-    other = _closed(subject, known, random_start(subject, subject.random()))
+    paired = group_of([kind(element.bodies, **values)], subject.space)
+    subject.same(residual(paired, motion)[0], 0 * residual(paired, motion)[0], 1e-11, f"pair {pair}: it does not hold")
+    other = _closed(subject, paired, random_start(subject, subject.random()))
     if other is not None:
         gap = residual(group_of([element], subject.space), other[0])[0]
         subject.same(gap, 0 * gap, 1e-11, f"pair {pair}: the joint does not hold where it does")
@@ -162,37 +162,37 @@ def _squared_distance(subject: Subject, element: Any) -> None:
     is_law = field_kinds(type(element))[field] == "motion"
     squares = []
     for value in (0.5, 1.2):
-        changed = dataclasses.replace(element, **{field: str(value) if is_law else value})
-        squares.append(residual(group_of([changed], subject.space), motion)[0] + value**2)
-    words = f"squared_distance {field!r}: the residual is not the square of a distance less the square of it"
-    subject.same(squares[0], squares[1], 1e-14, words)
+        variant = dataclasses.replace(element, **{field: str(value) if is_law else value})
+        squares.append(residual(group_of([variant], subject.space), motion)[0] + value**2)
+    message = f"squared_distance {field!r}: the residual is not the square of a distance less the square of it"
+    subject.same(squares[0], squares[1], 1e-14, message)
     if squares[0].min() < 0 or len(squares[0]) != 1:
-        raise Broken(words)
+        raise Broken(message)
 
 
 def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
     """Check that a joint still holds after all lengths and directions are multiplied by a factor."""
-    changed: dict[str, Any] = {}
+    variant: dict[str, Any] = {}
     for name, kind in field_kinds(type(element)).items():
         value = getattr(element, name)
         dimension = dimension_of_field(element, name)
-        stretched = dimension in ("length", "length per angle", "direction")
+        scales = dimension in ("length", "length per angle", "direction")
         if kind == "curve" and dimension == "length":
-            changed[name] = tuple(f"{FACTOR}*({entry})" for entry in value)
+            variant[name] = tuple(f"{FACTOR}*({entry})" for entry in value)
             continue
-        if kind not in ("scalar", "vector", "points", "motion") or (value is None and not stretched):
+        if kind not in ("scalar", "vector", "points", "motion") or (value is None and not scales):
             continue
-        if value is None or not (stretched or dimension in ("angle", "ratio")):
+        if value is None or not (scales or dimension in ("angle", "ratio")):
             return  # without a dimension of a field or the default of a length
-        if stretched:
-            changed[name] = f"{FACTOR}*({value})" if kind == "motion" else (FACTOR * np.asarray(value)).tolist()
-    wide = {**motion, "position": FACTOR * motion["position"]}
-    gap = residual(group_of([dataclasses.replace(element, **changed)], subject.space), wide)[0]
+        if scales:
+            variant[name] = f"{FACTOR}*({value})" if kind == "motion" else (FACTOR * np.asarray(value)).tolist()
+    scaled = {**motion, "position": FACTOR * motion["position"]}
+    gap = residual(group_of([dataclasses.replace(element, **variant)], subject.space), scaled)[0]
     if period := subject.period_of(group_of([element], subject.space)):
         period = FACTOR * period if isinstance(subject.period, str) else period
         gap[-1] -= period * np.round(gap[-1] / period)
-    words = (
+    message = (
         f"dimensions: a joint that holds no longer does where all lengths are multiplied by {FACTOR:g}; one of its "
         "fields has another dimension than the class states"
     )
-    subject.same(gap, 0 * gap, 1e-10, words)
+    subject.same(gap, 0 * gap, 1e-10, message)

@@ -30,8 +30,8 @@ def equilibrium(subject: Subject) -> None:
     subject.same(exerted.force / size, 0 * exerted.force, 1e-13, "the reactions have a resultant force")
     subject.same(exerted.moment / size, 0 * exerted.moment, 1e-12, "the reactions have a resultant moment")
     power, scale = power_of_element(forces, "joint", element, pose), size * np.abs(spins).max()
-    words = "the power of the reactions is not that of the multipliers on the residual"
-    subject.same(exerted.power / scale, power / scale, 1e-12, words)
+    message = "the power of the reactions is not that of the multipliers on the residual"
+    subject.same(exerted.power / scale, power / scale, 1e-12, message)
 
 
 class Resultant(NamedTuple):
@@ -100,8 +100,8 @@ def resultant(
     power: Any = 0.0
     size = 0.0
     load = element.role == "force" and len(element.bodies) == 1
-    felt = element.bodies if load else (*element.bodies, "ground")
-    for body in dict.fromkeys(felt):
+    bodies = element.bodies if load else (*element.bodies, "ground")
+    for body in dict.fromkeys(bodies):
         point, index = random.uniform(-1, 1, len(pose.position.coefficients[0])), INDEX[body]
         place = pose.take((index,)).point(point[:, None, None])
         path, speed = (np.stack(x.dense().coefficients)[..., 0] for x in (place, place.differentiate()))

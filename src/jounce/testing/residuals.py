@@ -59,13 +59,13 @@ def jacobian(subject: Subject) -> None:
     for k in range(1, order + 1):
         change = derivative[k, ..., 2 * k - 2] - derivative[k, ..., 2 * k - 1]
         x = np.swapaxes(unknowns[k, :, 1:, 0], 0, 1).reshape(-1)
-        words = f"coefficient {k} of the residual is not its Jacobian by the coordinates times theirs of that order"
-        subject.same(change, slopes @ x, 1e-12, words)
+        message = f"coefficient {k} of the residual is not its Jacobian by the coordinates times theirs of that order"
+        subject.same(change, slopes @ x, 1e-12, message)
 
     step = 1e-4
-    still = np.full(4 * unit.shape[-1], INSTANT)
-    moved = displaced(motion, np.concatenate([s * step * unit for s in (2, 1, -1, -2)], axis=-1))
-    far, near, behind, far_behind = np.split(residual(group, moved, still)[0], 4, axis=-1)
+    times = np.full(4 * unit.shape[-1], INSTANT)
+    displaced_motion = displaced(motion, np.concatenate([s * step * unit for s in (2, 1, -1, -2)], axis=-1))
+    far, near, behind, far_behind = np.split(residual(group, displaced_motion, times)[0], 4, axis=-1)
     differences = (-far + 8 * near - 8 * behind + far_behind) / (12 * step)
     subject.same(slopes, differences, 1e-9, "the Jacobian is not that of differences of the residual")
     if np.abs(slopes).max() <= 1e-9:
@@ -79,11 +79,11 @@ def jacobian_of_blocks(group: Group, motion: Motion) -> np.ndarray:
     frozen = Jet.constant(jnp.full((1, 1), INSTANT), 1)
     count = coordinates_of("planar" if "angle" in motion else "spatial")
     blocks = [np.array(block)[..., 0] for block in group.derivative_blocks(pose, frozen, jnp.ones(count))]
-    whole = np.zeros((*blocks[0].shape[1:], (len(BODIES) - 1) * count))
+    matrix = np.zeros((*blocks[0].shape[1:], (len(BODIES) - 1) * count))
     for slot, block in zip(group.moving_slots, blocks, strict=True):
-        first = (group.bodies[slot][0] - 1) * count
-        whole[..., first : first + count] = np.moveaxis(block, 0, -1)
-    return whole
+        column = (group.bodies[slot][0] - 1) * count
+        matrix[..., column : column + count] = np.moveaxis(block, 0, -1)
+    return matrix
 
 
 def derivatives(subject: Subject) -> None:
@@ -111,23 +111,23 @@ def derivatives(subject: Subject) -> None:
         )
     for k in range(1, 5):
         exact = [fit.deriv(k)(0.0) / np.prod(range(1, k + 1)) for fit in fits]
-        words = (
+        message = (
             f"derivative {k} along a motion is not that of the residual as a function of time; compute it from the "
             "jets of bodies and time alone"
         )
-        subject.same(jets[k].reshape(-1), exact, 1e-8 * 10**k, words)
+        subject.same(jets[k].reshape(-1), exact, 1e-8 * 10**k, message)
 
 
 def _around(subject: Subject, group: Group, motion: Motion, jets: Any, reach: float) -> tuple[np.ndarray, np.ndarray]:
     """Return neighboring instants relative to the instant, and their residuals, shape (rows, instances, instants)."""
     steps = reach * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
     powers = steps ** np.arange(len(motion["position"]))[:, None]
-    around = {
+    moved = {
         name: (series * powers.reshape(-1, *[1] * (series.ndim - 2), NODES)).sum(axis=0)[None]
         for name, series in motion.items()
     }
-    around["position"][..., 0, :] = 0
-    values = residual(group, around, INSTANT + steps)[0]
+    moved["position"][..., 0, :] = 0
+    values = residual(group, moved, INSTANT + steps)[0]
     if period := subject.period_of(group):
         values[-1] = np.unwrap(values[-1], period=period)
         values[-1] += period * np.round((jets[0, -1] - values[-1, :, [NODES // 2]]) / period)
@@ -144,23 +144,23 @@ def frames(subject: Subject) -> None:
     random = subject.random()
     group = group_of([subject.samples.element(random)], subject.space)
     motion = random_motion(random, subject.space, 2)
-    moved = seen_from_moving_frame(motion, random, 2)
+    seen = seen_from_moving_frame(motion, random, 2)
     if subject.samples.kind.hidden:  # its coordinates, those of the last body, are not a position in space
-        for name, series in moved.items():
+        for name, series in seen.items():
             series[..., -1, :] = motion[name][..., -1, :]
-    before, after = residual(group, motion), residual(group, moved)
-    words = (
+    before, after = residual(group, motion), residual(group, seen)
+    message = (
         "the residual changes where all bodies are moved together; take components along directions of a body, not of "
         "the global frame, or state relative=False where that is meant"
     )
     if period := subject.period_of(group):
-        subject.same(before[1:], after[1:], 1e-11, words)
+        subject.same(before[1:], after[1:], 1e-11, message)
         turns = (before[0] - after[0]) / period
-        subject.same(turns, np.round(turns), 1e-12, words)
+        subject.same(turns, np.round(turns), 1e-12, message)
     elif before.shape[1] == 1:
-        subject.same(before, after, 1e-12, words)
+        subject.same(before, after, 1e-12, message)
     else:
-        subject.same(_square(before), _square(after), 1e-11, words)
+        subject.same(_square(before), _square(after), 1e-11, message)
 
 
 def _square(rows: np.ndarray) -> np.ndarray:
@@ -175,21 +175,21 @@ def instances(subject: Subject) -> None:
     slots = [BODIES[1 : 1 + count], BODIES[4 - count + 1 : 5][::-1], (*BODIES[: count - 1], BODIES[4])]
     elements = [samples.element(random, bodies) for bodies in slots]
     motion = random_motion(random, subject.space, 1, batch=2)
-    together = residual(group_of(elements, subject.space), motion)
+    group_residual = residual(group_of(elements, subject.space), motion)
     for k, element in enumerate(elements):
         single = residual(group_of([element], subject.space), motion)
         bound = 1e-15 * (1.0 + np.abs(single[:, :, 0]))
-        words = "the residual of a joint among others is not that of the joint by itself"
-        subject.same(together[:, :, k] / bound, single[:, :, 0] / bound, 1.0, words)
+        message = "the residual of a joint among others is not that of the joint by itself"
+        subject.same(group_residual[:, :, k] / bound, single[:, :, 0] / bound, 1.0, message)
 
 
 def expressions(subject: Subject) -> None:
     """Check that values from expressions of parameters equal the numbers."""
     random = subject.random()
-    plain = subject.samples.element(random)
+    element = subject.samples.element(random)
     parameters, replaced = {"unit": 1.0, "law": 0.9}, {}
-    for name, kind in field_kinds(type(plain)).items():
-        value = getattr(plain, name)
+    for name, kind in field_kinds(type(element)).items():
+        value = getattr(element, name)
         if kind == "scalar" and isinstance(value, float):
             parameters[name] = value / 2
             replaced[name] = f"2*{name}"
@@ -202,9 +202,9 @@ def expressions(subject: Subject) -> None:
     if not replaced:
         raise SkippedContract("it has no numbers")
     motion = random_motion(random, subject.space, 1)
-    written = subject.samples.element(subject.random(), values={**_values(plain), **replaced})
-    values = residual(group_of([written], subject.space, parameters), motion)
-    expected = residual(group_of([plain], subject.space), motion)
+    expressed = subject.samples.element(subject.random(), values={**_values(element), **replaced})
+    values = residual(group_of([expressed], subject.space, parameters), motion)
+    expected = residual(group_of([element], subject.space), motion)
     subject.same(values, expected, 1e-15, "values given as expressions of parameters are not the numbers")
 
 

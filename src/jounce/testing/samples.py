@@ -69,12 +69,12 @@ class Samples:
         self, random: np.random.Generator, bodies: Sequence[str] = (), values: Mapping[str, Any] | None = None
     ) -> Any:
         """Return a random joint between bodies, with the given `values` of some fields."""
-        known = {**self.given, **(values or {})}
+        fixed_values = {**self.given, **(values or {})}
         chosen = {}
         for name, field in value_fields(self.kind).items():
             left_out = field.default is not dataclasses.MISSING and not self.optional and name != "offset"
-            if name in known or not left_out:
-                chosen[name] = known[name] if name in known else self._value(name, random)
+            if name in fixed_values or not left_out:
+                chosen[name] = fixed_values[name] if name in fixed_values else self._value(name, random)
         return self.kind(tuple(bodies) or self.bodies, **chosen)
 
     def _value(self, name: str, random: np.random.Generator) -> Any:
@@ -104,9 +104,9 @@ class Samples:
 
 def group_of(elements: Sequence[Any], space: str, parameters: Mapping[str, Any] | None = None) -> Group:
     """Return the group of stacked joints of one kind; the last body has their hidden coordinates."""
-    named = {f"joints.{k}": e for k, e in enumerate(elements)}
+    elements_by_name = {f"joints.{k}": e for k, e in enumerate(elements)}
     carriage = {carriage_of(str(k)): len(BODIES) - 1 for k in range(len(elements))}
-    (group,), _ = group_elements(named, parameters or {}, {**INDEX, **carriage}, POSITION_COMPONENTS[space])
+    (group,), _ = group_elements(elements_by_name, parameters or {}, {**INDEX, **carriage}, POSITION_COMPONENTS[space])
     return group
 
 
@@ -214,16 +214,16 @@ def with_unknowns(motion: Motion, unknowns: np.ndarray) -> Any:
 
 def displaced(motion: Motion, steps: np.ndarray) -> dict[str, np.ndarray]:
     """Return a position after steps (c, bodies, batch): translations, and rotations about body axes."""
-    moved = repeated(motion, steps.shape[-1])
-    shifts = moved["position"].shape[1]
-    moved["position"][0] += steps[:shifts]
-    if "angle" in moved:
-        moved["angle"][0] += steps[2]
+    result = repeated(motion, steps.shape[-1])
+    shifts = result["position"].shape[1]
+    result["position"][0] += steps[:shifts]
+    if "angle" in result:
+        result["angle"][0] += steps[2]
     else:
         angle = np.linalg.norm(steps[3:], axis=0)
         half = np.concatenate([np.cos(angle / 2)[None], steps[3:] * (0.5 * np.sinc(angle / 2 / np.pi))])
-        moved["quaternion"][0] = quaternion_product(moved["quaternion"][0], half)
-    return moved
+        result["quaternion"][0] = quaternion_product(result["quaternion"][0], half)
+    return result
 
 
 def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -234,14 +234,14 @@ def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 def seen_from_moving_frame(motion: Motion, random: np.random.Generator, order: int) -> dict[str, np.ndarray]:
     """Return the motion after a common rigid motion of all bodies, a random function of time."""
-    turned = {name: series.copy() for name, series in motion.items()}
+    result = {name: series.copy() for name, series in motion.items()}
     common = random_motion(random, "planar" if "angle" in motion else "spatial", order)
     common = {name: series[..., 1:2, :] for name, series in common.items()}
     frame, local = pose_of(common), Jet(map(jnp.asarray, motion["position"]))
-    turned["position"] = np.array(frame.point(local).dense().coefficients)
+    result["position"] = np.array(frame.point(local).dense().coefficients)
     if "angle" in motion:
-        turned["angle"] = motion["angle"] + common["angle"]
-        return turned
+        result["angle"] = motion["angle"] + common["angle"]
+        return result
     a, b = ([Jet(jnp.asarray(level[k]) for level in s["quaternion"]) for k in range(4)] for s in (common, motion))
     product = stack(
         [
@@ -251,5 +251,5 @@ def seen_from_moving_frame(motion: Motion, random: np.random.Generator, order: i
             a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
         ]
     )
-    turned["quaternion"] = np.array(product.dense().coefficients)
-    return turned
+    result["quaternion"] = np.array(product.dense().coefficients)
+    return result

@@ -98,12 +98,12 @@ def residual(group: Group, motion: Motion, instants: np.ndarray | None = None) -
     """
     batch = motion["position"].shape[-1]
     lanes = max(batch, lanes_of("planar" if "angle" in motion else "spatial"))
-    wide = {name: widened(series, lanes) for name, series in motion.items()}
+    widened_motion = {name: widened(series, lanes) for name, series in motion.items()}
     if instants is None:
         time = time_jet(len(motion["position"]) - 1, lanes)
     else:
         time = Jet([jnp.asarray(widened(instants, lanes))[None]])
-    return evaluated(group, pose_of(wide), time)[..., :batch]
+    return evaluated(group, pose_of(widened_motion), time)[..., :batch]
 
 
 def evaluated(group: Group, pose: Any, time: Jet) -> np.ndarray:

@@ -88,9 +88,9 @@ def describe_dimension(dimension: Dimension) -> str:
     """
     if dimension in _WORDS:
         return _WORDS[dimension]
-    over = "*".join(base if power == 1 else f"{base}^{power}" for base, power in dimension if power > 0) or "1"
-    under = "/".join(base if power == -1 else f"{base}^{-power}" for base, power in dimension if power < 0)
-    return f"{over}/{under}" if under else over
+    numerator = "*".join(base if power == 1 else f"{base}^{power}" for base, power in dimension if power > 0) or "1"
+    denominator = "/".join(base if power == -1 else f"{base}^{-power}" for base, power in dimension if power < 0)
+    return f"{numerator}/{denominator}" if denominator else numerator
 
 
 def si_unit(dimension: Dimension) -> str:
@@ -114,18 +114,18 @@ def si_unit(dimension: Dimension) -> str:
     return (over or "1") + under if dimension else ""
 
 
-def check_dimension(dimension: Dimension, kind: str, what: str, *, exactly: bool = True) -> None:
-    """Raise UnitError unless a dimension suits a kind of value; ``what`` names the value.
+def check_dimension(dimension: Dimension, kind: str, noun: str, *, exactly: bool = True) -> None:
+    """Raise UnitError unless a dimension suits a kind of value; ``noun`` names the value.
 
     For computed values (not ``exactly``), powers of angles are ignored: a radius times an angle is a length.
     """
-    words, allowed = KINDS[kind]
+    expected, allowed = KINDS[kind]
     if not exactly:
         dimension_of_it, fitting = without_angles(dimension), [without_angles(entry) for entry in allowed]
     else:
         dimension_of_it, fitting = dimension, list(allowed)
     if fitting and dimension_of_it not in fitting:
-        raise UnitError(f"expected {words}, but {what} is {describe_dimension(dimension)}")
+        raise UnitError(f"expected {expected}, but {noun} is {describe_dimension(dimension)}")
 
 
 def is_rate(dimension: Dimension, bases: Iterable[str], order: int, by: str = "time") -> bool:
@@ -261,8 +261,8 @@ class _Reader:
         if operation in ("pos", "neg", "abs"):
             return replace(first, number=-first.number if operation == "neg" and first.number is not None else None)
         if operation in ("+", "-", "atan2"):
-            whole = self._sum(first, second)
-            return whole if operation != "atan2" else replace(whole, dimension=ANGLE, doubt=0)
+            total = self._sum(first, second)
+            return total if operation != "atan2" else replace(total, dimension=ANGLE, doubt=0)
         if operation in ("*", "/"):
             return self._product(first, second, 1 if operation == "*" else -1)
         if operation == "sign":
@@ -275,12 +275,12 @@ class _Reader:
             self._pure(second, "an exponent")
             return replace(first, number=None) if first.dimension == NUMBER else _UNKNOWN
         self._pure(first, f"the argument of {operation}")
-        turning = operation in ("asin", "acos", "atan")
-        return _Part(ANGLE, stated=first.stated) if turning else _Part(NUMBER)
+        is_inverse = operation in ("asin", "acos", "atan")
+        return _Part(ANGLE, stated=first.stated) if is_inverse else _Part(NUMBER)
 
-    def _pure(self, part: _Part, what: str) -> None:
+    def _pure(self, part: _Part, noun: str) -> None:
         if not part.doubt and part.stated and part.dimension is not None and without_angles(part.dimension):
-            raise UnitError(f"{what} in '{self.text}' is {describe_dimension(part.dimension)}, not a pure number")
+            raise UnitError(f"{noun} in '{self.text}' is {describe_dimension(part.dimension)}, not a pure number")
 
     def _sum(self, first: _Part, second: _Part) -> _Part:
         stated = sorted((p for p in (first, second) if p.stated and p.doubt < DOUBTFUL), key=lambda p: p.doubt)
@@ -301,11 +301,11 @@ class _Reader:
     def _product(first: _Part, second: _Part, power: int) -> _Part:
         if first.dimension is None or second.dimension is None:
             return _UNKNOWN
-        whole = times(first.dimension, second.dimension, power)
+        dimension = times(first.dimension, second.dimension, power)
         number = None if None in (first.number, second.number) else math.nan
         if number is not None and (power > 0 or second.number):
             number = first.number * second.number**power  # type: ignore[operator]
-        return _Part(whole, max(first.doubt, second.doubt), first.stated or second.stated, number)
+        return _Part(dimension, max(first.doubt, second.doubt), first.stated or second.stated, number)
 
     @staticmethod
     def _power(part: _Part, power: Fraction) -> _Part:

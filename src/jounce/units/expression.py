@@ -222,8 +222,8 @@ class Expression:
             if math.isfinite(value) or not all(map(math.isfinite, arguments)):
                 return value
             problem = "is too large"
-        shown = _show_operation(word, arguments)
-        raise ExpressionError(f"{shown} {problem}{_where(column, self.text)}", column=column)
+        text = _show_operation(word, arguments)
+        raise ExpressionError(f"{text} {problem}{_where(column, self.text)}", column=column)
 
     def __repr__(self) -> str:
         return f"Expression({self.text!r})"
@@ -262,10 +262,10 @@ def _fail(problem: str, column: int, text: str, hint: str = _ALLOWED) -> NoRetur
     raise ExpressionError(f"{problem}{_where(column, text)}; {hint}", column=column)
 
 
-def _refuse_name(name: str, column: int, text: str, known: Iterable[str]) -> NoReturn:
+def _refuse_name(name: str, column: int, text: str, names: Iterable[str]) -> NoReturn:
     if name in FUNCTIONS:
         _fail(f"the function '{name}' stands without its arguments", column, text, f"write {name}(...)")
-    candidates = {*known, *CONSTANTS}
+    candidates = {*names, *CONSTANTS}
     unit = f"; for the unit {name} make a parameter, such as lift: 5 {name}" if name in _UNITS else ""
     _fail(f"unknown name '{name}'", column, text, did_you_mean(name, candidates) + unit)
 
@@ -351,20 +351,20 @@ def _refuse(node: ast.AST, column: int, text: str) -> NoReturn:
         case ast.BinOp(op=ast.BitXor()):
             _fail("the operator ^ is not allowed", column, text, "a power is written **")
         case ast.BinOp(op=sign) | ast.UnaryOp(op=sign):
-            shown = f"the operator {type(sign).__name__}"
+            label = f"the operator {type(sign).__name__}"
         case ast.Call():
             _fail("something that is not a function is called", column, text, "a product needs its *, as in 2*(a + b)")
         case ast.Attribute(attr=attribute):
-            shown = f"an attribute, '.{attribute}',"
+            label = f"an attribute, '.{attribute}',"
         case ast.Constant(value=bool() | None):
-            shown = f"the word '{node.value}'"
+            label = f"the word '{node.value}'"
         case ast.Constant(value=str() | bytes()):
-            shown = "a string"
+            label = "a string"
         case ast.Constant(value=complex()):
-            shown = "a complex number"
+            label = "a complex number"
         case _:
-            shown = _REPORTED.get(type(node), "something else")
-    _fail(f"{shown} is not allowed", column, text)
+            label = _REPORTED.get(type(node), "something else")
+    _fail(f"{label} is not allowed", column, text)
 
 
 def _number(value: int | float, column: int, text: str) -> float:
@@ -388,8 +388,8 @@ def _arguments(
 ) -> list[ast.AST]:
     """Return the arguments of a function, after a check that it exists and accepts their number."""
     if name not in counts:
-        near = difflib.get_close_matches(name, counts, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"valid: {', '.join(counts)}"
+        matches = difflib.get_close_matches(name, counts, n=1)
+        hint = f"did you mean '{matches[0]}'?" if matches else f"valid: {', '.join(counts)}"
         _fail(f"unknown function '{name}'", column, text, hint)
     if keywords:
         _fail(f"a keyword in the arguments of {name} is not allowed", column, text)

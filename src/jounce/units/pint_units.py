@@ -61,19 +61,19 @@ def ask_pint(name: str) -> tuple[float, Dimension] | None:
         factor, units = registry.get_base_units(prefix + unit)
         items = registry.Quantity(factor, units).unit_items()
         powers = {_BASES.get(str(base), str(base)): power for base, power in items}
-        fixed = registry._is_multiplicative(prefix + unit)
+        is_multiplicative = registry._is_multiplicative(prefix + unit)
     except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError):
         return None
-    shown = name.encode("ascii", "backslashreplace").decode("ascii")
-    if not fixed:
-        raise UnitError(f"the unit '{shown}' has no fixed zero, it cannot be used")
-    whole = all(Fraction(power).denominator == 1 for power in powers.values())
-    dimension = dimension_of(**{base: int(power) for base, power in powers.items()}) if whole else None
+    label = name.encode("ascii", "backslashreplace").decode("ascii")
+    if not is_multiplicative:
+        raise UnitError(f"the unit '{label}' has no fixed zero, it cannot be used")
+    are_integer = all(Fraction(power).denominator == 1 for power in powers.values())
+    dimension = dimension_of(**{base: int(power) for base, power in powers.items()}) if are_integer else None
     if dimension is None or (dimension not in _MECHANICAL and not (dimension == NUMBER and unit in _PURE)):
-        message = f"the unit '{shown}' ({unit}) has a dimension that no mechanism uses"
+        message = f"the unit '{label}' ({unit}) has a dimension that no mechanism uses"
         raise UnitError(f"{message}; {nearest_unit(name)}".rstrip("; "))
     if prefix and (unit not in _PREFIXABLE | _TO_KILO or (unit in _TO_KILO and prefix in _LARGE)):
         raise UnitError(
-            f"the unit '{shown}' would be {prefix}{unit}, which nobody uses; {nearest_unit(name)}".rstrip("; ")
+            f"the unit '{label}' would be {prefix}{unit}, which nobody uses; {nearest_unit(name)}".rstrip("; ")
         )
     return float(factor), dimension

@@ -157,8 +157,8 @@ class ShownUnits:
                 raise error.located(name=f"units.{name}") from None
             dimensions = [self._of_output(name), self._of_kind(name)]
             if dimension not in dimensions:
-                words = " or ".join(describe_dimension(x) for x in dimensions if x is not None)
-                message = f"measures {describe_dimension(dimension)}, not {words}"
+                phrase = " or ".join(describe_dimension(x) for x in dimensions if x is not None)
+                message = f"measures {describe_dimension(dimension)}, not {phrase}"
                 raise UnitError(message, name=f"units.{name}", value=unit)
 
     def _of_output(self, name: str) -> Dimension | None:
@@ -191,9 +191,9 @@ class ShownUnits:
             rate = re.search(r"/s(?:\^(\d+))?$", self.outputs[name])
             order -= int(rate[1] or 1) if rate else 0
             return derivative_unit(shown, order), 1.0 / unit_size(shown)[0]
-        above, *below = base.split("/")
-        (shown, factor), parts = self._of_base(above), []
-        for part in below:
+        numerator, *denominators = base.split("/")
+        (shown, factor), parts = self._of_base(numerator), []
+        for part in denominators:
             known, _, exponent = part.partition("^")
             unit_below, size = self._of_base(known)
             parts.append(f"/{unit_below}" + (f"^{exponent}" if exponent else ""))
@@ -202,7 +202,7 @@ class ShownUnits:
 
     def _of_base(self, base: str) -> tuple[str, float]:
         """Return the unit in which a kind of quantity is shown, and the factor of its SI values."""
-        kind = next((kind for kind, (known, _) in QUANTITIES.items() if known == base), "")
+        kind = next((kind for kind, (unit, _) in QUANTITIES.items() if unit == base), "")
         shown = self._chosen(kind, self._of_kind(kind))
         return (shown, 1.0 / unit_size(shown)[0]) if shown else (base, 1.0)
 

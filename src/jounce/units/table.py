@@ -61,5 +61,5 @@ LONG = tuple(
 def nearest_unit(name: str) -> str:
     """Return a suggestion of a unit: one that differs in capitals only, or else the nearest; may be empty."""
     names = [*COMMON, *COMPACT, *LONG]
-    same = [unit for unit in names if unit.lower() == name.lower() and unit != name]
-    return f"did you mean '{same[0]}'?" if same else did_you_mean(name, names, limit=0)
+    matches = [unit for unit in names if unit.lower() == name.lower() and unit != name]
+    return f"did you mean '{matches[0]}'?" if matches else did_you_mean(name, names, limit=0)

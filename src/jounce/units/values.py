@@ -69,23 +69,23 @@ def parse_unit(text: str) -> tuple[Size, Dimension]:
     Decimal('1000')
     """
     size: Size = Decimal(1)
-    whole: Dimension = NUMBER
+    total: Dimension = NUMBER
     divided = False
     text = text.strip().removeprefix("1").lstrip() if re.match(r"1\s*/", text.strip()) else text.strip()
     for sign, name, exponent, group in _PIECE.findall(text):
-        under = "/" in sign
+        is_divisor = "/" in sign
         if divided and sign and not sign.strip():
             raise UnitError("a space after a / can be read in two ways; write * and parentheses")
-        divided |= under
+        divided |= is_divisor
         factor, dimension = parse_unit(group) if group else _powered(name, _whole_power(exponent))
-        power = -1 if under else 1
-        size, whole = _product(size, factor, power), times(whole, dimension, power)
-    return size, whole
+        power = -1 if is_divisor else 1
+        size, total = _product(size, factor, power), times(total, dimension, power)
+    return size, total
 
 
 def _whole_power(text: str) -> int:
-    plain = text.translate(_DIGITS).replace("\N{SUPERSCRIPT MINUS}", "-")
-    return int(plain.strip(" *^()") or 1)
+    digits = text.translate(_DIGITS).replace("\N{SUPERSCRIPT MINUS}", "-")
+    return int(digits.strip(" *^()") or 1)
 
 
 def _powered(name: str, power: int) -> tuple[Size, Dimension]:
@@ -94,12 +94,12 @@ def _powered(name: str, power: int) -> tuple[Size, Dimension]:
     if factors is None and name not in COMMON and (digit := re.fullmatch(r"([A-Za-z]+)([2-4])", name)) and power == 1:
         return _powered(digit[1], int(digit[2]))
     size: Size = Decimal(1)
-    whole: Dimension = NUMBER
+    total: Dimension = NUMBER
     for factor in factors or (name,):
-        own, dimension = COMMON.get(factor) or _looked_up(factor)
+        factor_size, dimension = COMMON.get(factor) or _looked_up(factor)
         count = power if factor is (factors or (name,))[-1] else 1
-        size, whole = _product(size, own, count), times(whole, dimension, count)
-    return size, whole
+        size, total = _product(size, factor_size, count), times(total, dimension, count)
+    return size, total
 
 
 def _product(size: Size, factor: Size, power: int) -> Size:
@@ -112,8 +112,8 @@ def _looked_up(name: str) -> tuple[Size, Dimension]:
     """Return the size and dimension of a unit in the library of units."""
     if answer := ask_pint(name):
         return answer
-    shown = name.encode("ascii", "backslashreplace").decode("ascii")
-    raise UnitError(f"unknown unit '{shown}'; {nearest_unit(name)}".rstrip("; "))
+    label = name.encode("ascii", "backslashreplace").decode("ascii")
+    raise UnitError(f"unknown unit '{label}'; {nearest_unit(name)}".rstrip("; "))
 
 
 def parse_value(
@@ -189,17 +189,17 @@ def stated_dimensions(
     >>> stated_dimensions({"area": "a*a", "a": "5 cm", "double": "2*a"})
     {'a': (('length', 1),), 'area': (('length', 2),)}
     """
-    dimensions, waiting, count = dict(known or {}), dict(parameters), -1
+    dimensions, pending, count = dict(known or {}), dict(parameters), -1
     while len(dimensions) > count:
         count = len(dimensions)
-        for name, raw in list(waiting.items()):
+        for name, raw in list(pending.items()):
             try:
                 dimension = parse_value(raw, "any", parameters, dimensions).dimension
             except JounceError:  # reported elsewhere, with its location
                 continue
             if dimension is not None:
                 dimensions.setdefault(name, dimension)
-                del waiting[name]
+                del pending[name]
     return dimensions
 
 
@@ -214,8 +214,8 @@ def _parse_text(
         raise ExpressionError(f"a value has at most {MAX_CHARACTERS} characters")
     if comma := _DECIMAL_COMMA.fullmatch(text.strip()):
         point = f"{comma[1]}.{comma[2]} {comma[3] or ''}".strip()
-        whole = f" or {comma[1]}{comma[2]} {comma[3] or ''}".rstrip() if len(comma[2]) == 3 else ""
-        raise UnitError(f"a number has a decimal point and no thousands separator: write {point}{whole}")
+        alternative = f" or {comma[1]}{comma[2]} {comma[3] or ''}".rstrip() if len(comma[2]) == 3 else ""
+        raise UnitError(f"a number has a decimal point and no thousands separator: write {point}{alternative}")
     with_unit = _WITH_UNIT.fullmatch(text.strip())
     if with_unit and not _divided_by_a_name(with_unit[2], known_names):
         return _parse_with_unit(*with_unit.groups(), kind=kind, known_names=known_names, variables=variables)
@@ -232,8 +232,8 @@ def _parse_text(
     if expression.text in dimensions:
         check_dimension(dimensions[expression.text], kind, f"the parameter '{expression.text}'")
         return Value(expression, dimensions[expression.text])
-    stated = {name: dimensions[name] for name in expression.names if name in dimensions and name not in variables}
-    dimension = inferred(expression, stated, variables, kind)
+    given = {name: dimensions[name] for name in expression.names if name in dimensions and name not in variables}
+    dimension = inferred(expression, given, variables, kind)
     if dimension is not None:
         check_dimension(dimension, kind, f"'{expression.text}'", exactly=False)
     return Value(expression, dimension)
@@ -297,17 +297,17 @@ def _parse_with_unit(
     number: str, unit: str, *, kind: str, known_names: Collection[str], variables: Mapping[str, Dimension | None]
 ) -> Value:
     first = re.match(_ATOM, unit)
-    named = next((atom for atom in re.finditer(_ATOM, unit) if atom.start() and atom[0] in variables), None)
-    if named:  # in a law, t is no tonne
-        before = unit[: named.start()].rstrip()
+    variable = next((atom for atom in re.finditer(_ATOM, unit) if atom.start() and atom[0] in variables), None)
+    if variable:  # in a law, t is no tonne
+        before = unit[: variable.start()].rstrip()
         if set(re.findall(_ATOM, before)) <= {*known_names, *CONSTANTS}:
             raise UnitError(f"a product needs its *, as in {number}*{re.sub(_SIGN, _multiplied, unit)}")
         sign = "/" if before.endswith("/") else "*"
         given = f"{number} {before.rstrip(f'*/ {_DOTS}')}"
-        message = f"a number with a unit must stand alone, and '{named[0]}' would be a unit, too; give "
+        message = f"a number with a unit must stand alone, and '{variable[0]}' would be a unit, too; give "
         if "(" in before:
             raise UnitError(f"{message}it as a parameter, and write its name here")
-        raise UnitError(f"{message}'{given}' as a parameter, such as c: {given}, and write c{sign}{named[0]}")
+        raise UnitError(f"{message}'{given}' as a parameter, such as c: {given}, and write c{sign}{variable[0]}")
     try:
         size, dimension = parse_unit(unit)
         check_dimension(dimension, kind, f"the unit of {show_value(f'{number} {unit}')}")

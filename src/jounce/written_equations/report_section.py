@@ -41,7 +41,7 @@ def equations_section(motion: Motion, at: Real | None = None) -> str:
         raise MechanismError(f"was not solved at t = {time[place]:g} s; choose another", name="at", value=at)
     equations = constraint_equations(motion)
     pattern = (np.abs(equations.jacobian.values[motion.status == Status.OK]) > 0).any(axis=0)
-    now = equations.isel(time=place)
+    values = equations.isel(time=place)
     return "\n".join([
         '<section id="equations">',
         f"<h2>Constraint equations at t = {float(time[place]):.9g} s</h2>",
@@ -51,7 +51,7 @@ def equations_section(motion: Motion, at: Real | None = None) -> str:
         f"<h2>Jacobian, {pattern.shape[0]} by {pattern.shape[1]}: where it is not zero</h2>",
         f'<pre class="wide">{_pattern(equations, pattern)}</pre>',
         "<h2>Residuals and right sides, SI units</h2>",
-        f'<div class="wide">{_sides(now)}</div>',
+        f'<div class="wide">{_sides(values)}</div>',
         "</section>",
     ])  # fmt: skip
 
@@ -67,11 +67,11 @@ def _pattern(equations: "xarray.Dataset", pattern: np.ndarray) -> str:
     """Return the pattern of nonzero entries: a line for each row, a group of places for each body."""
     columns, rows = equations.column.values.tolist(), equations.row.values.tolist()
     bodies = [column.rpartition(".")[0] for column in columns]
-    known = list(dict.fromkeys(bodies))
-    counts = [bodies.count(body) for body in known]
+    names = list(dict.fromkeys(bodies))
+    counts = [bodies.count(body) for body in names]
     width = max(map(len, rows), default=0)
-    widths = [max(2 * count - 1, len(body)) for body, count in zip(known, counts, strict=True)]
-    lines = [" " * width + "  " + "  ".join(body.ljust(size) for body, size in zip(known, widths, strict=True))]
+    widths = [max(2 * count - 1, len(body)) for body, count in zip(names, counts, strict=True)]
+    lines = [" " * width + "  " + "  ".join(body.ljust(size) for body, size in zip(names, widths, strict=True))]
     for row, marks in zip(rows, pattern.tolist(), strict=True):
         parts, first = [], 0
         for count, size in zip(counts, widths, strict=True):
@@ -81,18 +81,18 @@ def _pattern(equations: "xarray.Dataset", pattern: np.ndarray) -> str:
     return html.escape("\n".join(line.rstrip() for line in lines))
 
 
-def _sides(now: "xarray.Dataset") -> str:
-    orders = [k for k in now.derivative.values.tolist() if np.isfinite(now.right_side.sel(derivative=k)).any()]
+def _sides(values: "xarray.Dataset") -> str:
+    orders = [k for k in values.derivative.values.tolist() if np.isfinite(values.right_side.sel(derivative=k)).any()]
     names = [SIDES[k - 1] if k <= len(SIDES) else f"k = {k}" for k in orders]
-    columns = [now.residual.values, *(now.right_side.sel(derivative=k).values for k in orders)]
-    if "multipliers" in now:
-        names, columns = [*names, "&lambda;"], [*columns, now.multipliers.sel(derivative=0).values]
-    rows = ((row, *(f"{column[k]:.9g}" for column in columns)) for k, row in enumerate(now.row.values.tolist()))
+    columns = [values.residual.values, *(values.right_side.sel(derivative=k).values for k in orders)]
+    if "multipliers" in values:
+        names, columns = [*names, "&lambda;"], [*columns, values.multipliers.sel(derivative=0).values]
+    rows = ((row, *(f"{column[k]:.9g}" for column in columns)) for k, row in enumerate(values.row.values.tolist()))
     return _table(("row", "&Phi;", *names), rows)
 
 
-def _table(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+def _table(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     """Return a table in HTML; heads are HTML, rows are plain text."""
-    lines = [f"<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>"]
+    lines = [f"<tr>{''.join(f'<th>{head}</th>' for head in headings)}</tr>"]
     lines += [f"<tr>{''.join(f'<td>{html.escape(str(x))}</td>' for x in row)}</tr>" for row in rows]
     return f"<table>{''.join(lines)}</table>"

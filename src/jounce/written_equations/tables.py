@@ -23,13 +23,13 @@ def columns(equations: "xarray.Dataset") -> "xarray.Dataset":
     for name, variable in equations.data_vars.items():
         axes = [axis for axis in variable.dims if axis != "time"]
         for labels in itertools.product(*(variable[axis].values.tolist() for axis in axes)):
-            at = dict(zip(axes, labels, strict=True))
-            order = f"_{at['derivative']}" if "derivative" in at else ""
-            rest = [str(label) for axis, label in at.items() if axis != "derivative"]
-            values = np.asarray(variable.sel(at), float)
+            label_of = dict(zip(axes, labels, strict=True))
+            order = f"_{label_of['derivative']}" if "derivative" in label_of else ""
+            labels_left = [str(label) for axis, label in label_of.items() if axis != "derivative"]
+            values = np.asarray(variable.sel(label_of), float)
             if len(values) and np.isnan(values).all() and not np.isnan(np.asarray(equations.residual)).all():
                 continue
-            columns[".".join([f"{name}{order}", *rest])] = (("time", "derivative"), values[:, None])
+            columns[".".join([f"{name}{order}", *labels_left])] = (("time", "derivative"), values[:, None])
     return xarray.Dataset(columns, {"time": equations["time"], "derivative": [0]}, equations.attrs)
 
 
@@ -44,6 +44,6 @@ def as_json(equations: "xarray.Dataset") -> str:
 
 
 def _plain(values: np.ndarray) -> Any:
-    whole = values.astype(object)
-    whole[np.isnan(values)] = None
-    return whole.tolist()
+    objects = values.astype(object)
+    objects[np.isnan(values)] = None
+    return objects.tolist()

@@ -133,8 +133,8 @@ def equations(
         raise error("must be a name of C: letters, digits and _", name="name", value=name)
     if isinstance(model, Robot):
         if joint is not None or format == "latex":
-            what = ("joint", joint) if joint is not None else ("format", format)
-            raise RobotError("is for mechanisms; a robot has code of all joints", name=what[0], value=what[1])
+            argument = ("joint", joint) if joint is not None else ("format", format)
+            raise RobotError("is for mechanisms; a robot has code of all joints", name=argument[0], value=argument[1])
         chosen = _quantities(quantities, robot_equations.QUANTITIES, error)
         code = robot_equations.robot_code(model, order, chosen, drives=drives)
     else:
@@ -150,12 +150,12 @@ def equations(
     return _text(code, format, name, error)
 
 
-def _quantities(given: Sequence[str], known: tuple[str, ...], error: type[JounceError]) -> tuple[str, ...]:
+def _quantities(given: Sequence[str], names: tuple[str, ...], error: type[JounceError]) -> tuple[str, ...]:
     """Return the quantities to write, in their usual order; the first known quantity unless given."""
     given = (given,) if isinstance(given, str) else tuple(given)
     for quantity in given:
-        check_choice("quantities", quantity, known, error)
-    return tuple(quantity for quantity in known if quantity in given) or known[:1]
+        check_choice("quantities", quantity, names, error)
+    return tuple(quantity for quantity in names if quantity in given) or names[:1]
 
 
 def _text(code: Code, format: str, name: str, error: type[JounceError]) -> str:  # noqa: A002
@@ -180,8 +180,8 @@ def owner_of_table(code: Code) -> str:
     """Return the joint, driver or function that reads a table of numbers, or an empty text."""
     for function in code.functions:
         for place in np.ndindex(*function.results.shape):
-            reached = code.graph.reached([int(function.results[place])])
-            if any(code.graph.nodes[n].operation == "lookup" for n in reached):
+            visited = code.graph.reached([int(function.results[place])])
+            if any(code.graph.nodes[n].operation == "lookup" for n in visited):
                 row = dict(zip(function.axes, place, strict=True)).get("row")
                 return function.name if row is None else code.labels["ROWS"][row].rpartition(".")[0]
     return ""

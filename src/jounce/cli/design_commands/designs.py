@@ -128,8 +128,8 @@ def optimize(
     if out is not None:
         from jounce.io.mechanisms.revision import write_revised
 
-        changed = {*bounds, *assignments(reading.set_ or (), "--set", "as NAME=VALUE")}
-        arguments: Any = (design.mechanism, sorted(changed), file, out)
+        varied = {*bounds, *assignments(reading.set_ or (), "--set", "as NAME=VALUE")}
+        arguments: Any = (design.mechanism, sorted(varied), file, out)
         written(lambda: write_revised(*arguments, allow=allowed(reading.allow), overwrite=overwrite))
     print_result("optimize", lambda: {**facts, "written": out}, out, json=json)
     return 0 if design.success else 1
@@ -176,8 +176,8 @@ def _errors_about(file: Path) -> Iterator[None]:
     except DesignError as error:
         raise error.located(path=file) from None
     except JounceError as error:
-        first, dot, rest = str(error.name).partition(".")
+        first, dot, remainder = str(error.name).partition(".")
         if first in OPTIONS:
-            error.name = f"--{SPELT.get(first, first)}{' ' if dot else ''}{rest}"
+            error.name = f"--{SPELT.get(first, first)}{' ' if dot else ''}{remainder}"
             raise
         raise error.located(path=file) from None

@@ -134,9 +134,9 @@ def _robot(
             body_mass(name, body, {}, 3)  # mechanism files allow real bodies only
         data, _ = mechanism_data(mechanism, target.stem)
     _put(dumped(data, target.suffix.lower(), str(target)), target, (), True)
-    driven = hold or len(laws) == len(robot.joint_names)
-    following = [] if robot.closures else [f"jounce {'run' if driven else 'simulate'} {target}"]
-    print_text(f"Written to {target}\n\nTry now:\n  " + "\n  ".join([f"jounce inspect {target}", *following]))
+    is_driven = hold or len(laws) == len(robot.joint_names)
+    next_commands = [] if robot.closures else [f"jounce {'run' if is_driven else 'simulate'} {target}"]
+    print_text(f"Written to {target}\n\nTry now:\n  " + "\n  ".join([f"jounce inspect {target}", *next_commands]))
     for old, new in renamed.items():
         print_warning(f"'{old}' is called '{new}' in {target}, where names have letters, digits, _ and -")
     return 0

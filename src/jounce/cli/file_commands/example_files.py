@@ -36,19 +36,19 @@ def example(
     from jounce.io.files.examples import copy_example, example_names
 
     if name is None:
-        known = example_names()
+        examples = example_names()
         if json:
-            say_json("example", {"examples": [{"name": name, "about": about} for name, about in known.items()]})
+            say_json("example", {"examples": [{"name": name, "about": about} for name, about in examples.items()]})
             return 0
-        show_columns(list(known.items()))
+        show_columns(list(examples.items()))
         print_text("\nCopy one with: jounce example NAME [FILE]")
         return 0
-    written = [str(path) for path in copy_example(name, file, overwrite=overwrite)]
+    paths = [str(path) for path in copy_example(name, file, overwrite=overwrite)]
     if json:
-        say_json("example", {"name": name, "written": written})
+        say_json("example", {"name": name, "written": paths})
         return 0
-    for path in written:
+    for path in paths:
         print_text(f"Written to {path}")
-    if not name.startswith(NO_MODELS) and written[0].endswith((".yaml", ".urdf", ".xml", ".sdf")):
-        print_text(f"\nTry now:\n  jounce inspect {shlex.quote(written[0])}")
+    if not name.startswith(NO_MODELS) and paths[0].endswith((".yaml", ".urdf", ".xml", ".sdf")):
+        print_text(f"\nTry now:\n  jounce inspect {shlex.quote(paths[0])}")
     return 0

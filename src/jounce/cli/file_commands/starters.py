@@ -55,8 +55,8 @@ def new(
         name, file = from_, None if name is None else Path(name)
     if name is None:
         if json:
-            listed = [{"name": s.name, "about": s.about, "command": s.command} for s in STARTERS.values()]
-            say_json("new", {"starters": listed})
+            starters = [{"name": s.name, "about": s.about, "command": s.command} for s in STARTERS.values()]
+            say_json("new", {"starters": starters})
             return 0
         show_columns([(starter.name, starter.about) for starter in STARTERS.values()])
         print_text("\nWrite one with: jounce new NAME [FILE]; complete machines: jounce example")
@@ -65,9 +65,9 @@ def new(
     starter = write_starter(name, target, overwrite=overwrite)
     second, suffix = ("plot", ".png") if starter.command == "run" else ("simulate", ".csv")
     paths = [shlex.quote(str(path)) for path in (target, target.with_suffix(suffix))]
-    following = [f"jounce {starter.command} {paths[0]}", f"jounce {second} {paths[0]} --out {paths[1]}"]
+    next_commands = [f"jounce {starter.command} {paths[0]}", f"jounce {second} {paths[0]} --out {paths[1]}"]
     if json:
-        say_json("new", {"name": starter.name, "written": str(target), "next": following})
+        say_json("new", {"name": starter.name, "written": str(target), "next": next_commands})
         return 0
-    print_text(f"{starter.about}\nWritten to {target}\n\nTry now:\n  " + "\n  ".join(following))
+    print_text(f"{starter.about}\nWritten to {target}\n\nTry now:\n  " + "\n  ".join(next_commands))
     return 0

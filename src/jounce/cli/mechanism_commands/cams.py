@@ -73,17 +73,17 @@ def cam(
         profile = load_cam(file, allow=allowed(allow), set_=set_ or (), count=count)
     for target in (output.out, figure):
         spare_inputs(target, overwrite=output.overwrite)
-    shown = units_chosen(profile.shown_units, units)
+    shown_units = units_chosen(profile.shown_units, units)
     with errors_about(file):
         facts = cam_facts(profile)
     if not output.json:
-        print_text(cam_words(facts, shown))
-    output.write(lambda: in_units(profile.dataset, shown), header_units=unit_choice)
+        print_text(cam_words(facts, shown_units))
+    output.write(lambda: in_units(profile.dataset, shown_units), header_units=unit_choice)
     if figure is not None:
         from jounce.plot import draw_cam, save
 
-        drawn = draw_cam(profile, shown)
-        written(lambda: save(drawn, figure, overwrite=output.overwrite))
+        drawing = draw_cam(profile, shown_units)
+        written(lambda: save(drawing, figure, overwrite=output.overwrite))
     output.tell("cam", lambda: {"file": file, **facts, "written": output.out})
     if figure is not None and not output.json:
         print_text(f"\nWritten to {figure}")

@@ -100,9 +100,9 @@ def write_curves(
 
     facts = [curve_facts(curve) for curve in curves]
     if not output.json:
-        for each in facts:
-            print_text(curve_summary(each, file.name))
-            for table in curve_tables(each):
+        for fact in facts:
+            print_text(curve_summary(fact, file.name))
+            for table in curve_tables(fact):
                 show_table(table)
     output.write(lambda: curves[0].dataset)
     if figure is not None:
@@ -117,5 +117,5 @@ def _draw(curves: list[Curve], figure: Path, show: list[str] | None, file: Path,
     from jounce.plot import draw_curves, save
 
     with errors_about(file):
-        drawn = draw_curves(curves, show)
-        written(lambda: save(drawn, figure, overwrite=overwrite))
+        drawing = draw_curves(curves, show)
+        written(lambda: save(drawing, figure, overwrite=overwrite))

@@ -75,8 +75,8 @@ def energies(
 
     for name, value in (("--order", order), ("--rates", rates)):
         if not 0 <= value <= MOST - (order if name == "--rates" else 0):
-            most = MOST - (order if name == "--rates" else 0)
-            raise JounceError(f"must be a whole number from 0 to {most}", name=name, value=value)
+            highest = MOST - (order if name == "--rates" else 0)
+            raise JounceError(f"must be a whole number from 0 to {highest}", name=name, value=value)
     with explaining_other_kinds(file, "mechanism", "robot"):
         check_ending(file, (*DATA_FILES, *ROBOT_FILES))
     if out is not None:
@@ -93,8 +93,8 @@ def energies(
         written(lambda: write(dataset, out, overwrite=overwrite))
     if not json:
         times = dataset["time"].values
-        what = "Kinetic energy" if order == 0 else f"Acceleration energy of order {order}"
-        print_text(f"{what}, t = {times[0]:g} to {times[-1]:g} s")
+        title = "Kinetic energy" if order == 0 else f"Acceleration energy of order {order}"
+        print_text(f"{title}, t = {times[0]:g} to {times[-1]:g} s")
         for k, values in enumerate(dataset["energy"].values.T):
             unit = derivative_unit("J", 2 * order + k)
             print_text(f"  {'energy' if k == 0 else f'rate {k}'}: from {values.min():.9g} to {values.max():.9g} {unit}")

@@ -90,21 +90,21 @@ def plot(
     mechanism = reading.mechanism(file)
     spare_inputs(out, overwrite=overwrite)
     _check_names(mechanism, chosen, output or (), file)
-    least = max(derivative or 0, ORDERS.get(chosen, 0) if order is None or chosen in PORTRAITS else 0)
-    motion = solve_or_simulate(mechanism, file, least if order is None else max(order, derivative or 0))
-    look: dict[str, Any] = {"paths": output, "order": derivative or 0, "view": (azimuth, elevation)}
+    lowest = max(derivative or 0, ORDERS.get(chosen, 0) if order is None or chosen in PORTRAITS else 0)
+    motion = solve_or_simulate(mechanism, file, lowest if order is None else max(order, derivative or 0))
+    style: dict[str, Any] = {"paths": output, "order": derivative or 0, "view": (azimuth, elevation)}
     if names is not None:
-        look["names"] = names
+        style["names"] = names
     with errors_about(file):
         if chosen == "animation":
             from jounce.plot import animate
 
             with Count("drawing") as bar:
-                written(lambda: animate(motion, out, progress=bar, speed=speed, fps=fps, overwrite=overwrite, **look))
+                written(lambda: animate(motion, out, progress=bar, speed=speed, fps=fps, overwrite=overwrite, **style))
         else:
             from jounce.plot import save
 
-            figure = _drawn(motion, chosen, output, derivative, {"instant": instant, **look})
+            figure = _drawn(motion, chosen, output, derivative, {"instant": instant, **style})
             written(lambda: save(figure, out, overwrite=overwrite))
     print_text(f"Written to {out}")
     return outcome(motion, file)
@@ -135,23 +135,23 @@ def _check_names(mechanism: Mechanism, kind: str, names: Sequence[str], file: Pa
         known = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
     elif not known and kind in ("outputs", *PORTRAITS):
         raise MechanismError("there is nothing to draw; name some outputs", path=file, name="outputs")
-    what = "joint, driver or force" if kind == "reactions" else "output"
+    noun = "joint, driver or force" if kind == "reactions" else "output"
     for name in names:
-        check_name(what, name, known, MechanismError, path=file, name="joints" if kind == "reactions" else "outputs")
+        check_name(noun, name, known, MechanismError, path=file, name="joints" if kind == "reactions" else "outputs")
     if kind in PORTRAITS and len(names) > 1:
         raise MechanismError("one output is drawn at a time", path=file, name="--output", value=list(names))
 
 
-def _drawn(motion: Motion, kind: str, output: list[str] | None, derivative: int | None, look: dict[str, Any]) -> Any:
+def _drawn(motion: Motion, kind: str, output: list[str] | None, derivative: int | None, style: dict[str, Any]) -> Any:
     import jounce.plot as figures
 
-    one = _portrait_output(motion, kind, output)
+    output_name = _portrait_output(motion, kind, output)
     upper = 1 if derivative is None else max(derivative, 1)
     kinds: dict[str, Callable[[], Any]] = {
         "outputs": lambda: figures.draw(motion, output),
-        "sketch": lambda: figures.sketch(motion, **look),
-        "hodograph": lambda: figures.hodograph(motion, one, 1 if derivative is None else derivative),
-        "phase": lambda: figures.phase_portrait(motion, one, (upper - 1, upper)),
+        "sketch": lambda: figures.sketch(motion, **style),
+        "hodograph": lambda: figures.hodograph(motion, output_name, 1 if derivative is None else derivative),
+        "phase": lambda: figures.phase_portrait(motion, output_name, (upper - 1, upper)),
         "energy": lambda: figures.draw_energy(motion),
         "power": lambda: figures.draw_power(motion),
         "reactions": lambda: figures.draw_reactions(motion, output),
@@ -163,8 +163,8 @@ def _portrait_output(motion: Motion, kind: str, output: list[str] | None) -> str
     """Return the output of a portrait: the named one, or the first suitable one."""
     if output or kind not in PORTRAITS:
         return output[0] if output else ""
-    known = motion.mechanism.outputs
-    vectors = [n for n, values in motion.outputs.items() if kind == "phase" or (values.ndim == 3 and not known[n].axes)]
+    given = motion.mechanism.outputs
+    vectors = [n for n, values in motion.outputs.items() if kind == "phase" or (values.ndim == 3 and not given[n].axes)]
     return (vectors or list(motion.outputs))[0]
 
 
@@ -222,9 +222,9 @@ def report(
     mechanism = reading.mechanism(file)
     spare_inputs(out, overwrite=overwrite)
     motion = solve_or_simulate(mechanism, file, order)
-    look: dict[str, Any] = {"view": (azimuth, elevation), "source": file, "overwrite": overwrite}
-    look |= {"equations": equations, "at": at}
+    style: dict[str, Any] = {"view": (azimuth, elevation), "source": file, "overwrite": overwrite}
+    style |= {"equations": equations, "at": at}
     with errors_about(file):
-        written(lambda: write_report(motion, out, **look))
+        written(lambda: write_report(motion, out, **style))
     print_text(f"Written to {out}")
     return outcome(motion, file)

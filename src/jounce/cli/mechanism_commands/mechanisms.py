@@ -88,8 +88,8 @@ def run(
         motion = _streamed(mechanism, file, order, tolerance, output, refine=refine, heading=units)
         return _write_result("run", motion, file, output, refine=refine)
     motion = solved(mechanism, file, order, tolerance)
-    held: Any = {"holding": holding, "holding_out": holding_out}
-    return _finished("run", motion, file, output, refine=refine, heading=units, **held)
+    holding_options: Any = {"holding": holding, "holding_out": holding_out}
+    return _finished("run", motion, file, output, refine=refine, heading=units, **holding_options)
 
 
 def simulate(
@@ -212,18 +212,18 @@ def _finished(
 
         output.write(lambda: in_units(motion.dataset, motion.mechanism.shown_units), header_units=heading)
 
-    held = None
+    holding_results = None
     if holding:
         from jounce.dynamics import holding_forces
         from jounce.reporting.facts.holding_facts import holding_facts, write_holding
 
         with errors_about(file):
             ranges = holding_forces(motion)
-        held = holding_facts(ranges)
+        holding_results = holding_facts(ranges)
         if holding_out is not None:
             target = holding_out
             written(lambda: write_holding(ranges, target, overwrite=output.overwrite))
-    return _write_result(command, motion, file, output, refine=refine, write=write, held=held)
+    return _write_result(command, motion, file, output, refine=refine, write=write, held=holding_results)
 
 
 def _write_result(
@@ -250,8 +250,8 @@ def _write_result(
 
             show_table(holding_table(held, motion.mechanism.shown_units))
     write()
-    more = {} if held is None else {"holding": held}
-    output.tell(command, lambda: motion_result(motion, file, output.out, refine) | more)
+    extra = {} if held is None else {"holding": held}
+    output.tell(command, lambda: motion_result(motion, file, output.out, refine) | extra)
     return outcome(motion, file)
 
 

@@ -106,32 +106,32 @@ def modes(
         spare_inputs(target, overwrite=overwrite)
     from jounce.dynamics import equilibrium, linearize
 
-    rest = None
+    state = None
     with _errors_about(file):
         if moving:
-            small = _in_motion(subject, time, coordinate, settings | {"release": release})
+            linearization = _in_motion(subject, time, coordinate, settings | {"release": release})
         else:
-            rest = equilibrium(subject, time, method=method, **settings)
-            small = linearize(rest, coordinates=coordinate, release=release or ())
-        modes_found = small.modes
-        facts = modes_facts(small, file, without or [])
-        moved = None if animation is None else modes_found.motion(mode, amplitude)
+            state = equilibrium(subject, time, method=method, **settings)
+            linearization = linearize(state, coordinates=coordinate, release=release or ())
+        modes_found = linearization.modes
+        facts = modes_facts(linearization, file, without or [])
+        mode_motion = None if animation is None else modes_found.motion(mode, amplitude)
     if not json:
         resting = facts["equilibrium"]
-        words = f"in motion at t = {small.time:g} s" if resting is None else equilibrium_words(resting)
-        print_text(f"{small.mechanism.title or file.name}\n{words}\n")
-        for table in (*(() if rest is None else equilibrium_tables(rest)), modes_table(modes_found)):
+        phrase = f"in motion at t = {linearization.time:g} s" if resting is None else equilibrium_words(resting)
+        print_text(f"{linearization.mechanism.title or file.name}\n{phrase}\n")
+        for table in (*(() if state is None else equilibrium_tables(state)), modes_table(modes_found)):
             show_table(table)
     if out is not None:
         from jounce.reporting.facts.modes_facts import write_modes
 
-        written(lambda: write_modes(modes_found, small.mechanism.space, out, overwrite=overwrite))
-    if moved is not None and animation is not None:
+        written(lambda: write_modes(modes_found, linearization.mechanism.space, out, overwrite=overwrite))
+    if mode_motion is not None and animation is not None:
         from jounce.plot import animate
 
         with errors_about(file), Count("drawing") as bar:
-            duration = float(moved.time[-1])
-            written(lambda: animate(moved, animation, speed=duration / 2, progress=bar, overwrite=overwrite))
+            duration = float(mode_motion.time[-1])
+            written(lambda: animate(mode_motion, animation, speed=duration / 2, progress=bar, overwrite=overwrite))
         if not json:
             print_text(f"\nMode {mode} is in {animation}, {_slowly(duration)}")
     print_result("modes", lambda: {**facts, "written": out}, out, json=json)

@@ -107,8 +107,8 @@ def feedforward(
     if figure is not None and errors is not None:
         from jounce.plot import draw_feedforward, save
 
-        drawn = draw_feedforward(result, errors)
-        written(lambda: save(drawn, figure, overwrite=output.overwrite))
+        drawing = draw_feedforward(result, errors)
+        written(lambda: save(drawing, figure, overwrite=output.overwrite))
     output.write(lambda: result.dataset)
     output.tell("feedforward", lambda: facts.feedforward_result(result, file, trajectory, errors, output.out))
     return 0 if report.kept else 1

@@ -154,13 +154,13 @@ def deviation_of(text: str, robot: Robot | None = None) -> float:
     """Return the deviation in a text, an angle or a length, rad or m."""
     from jounce.units.dimensions import ANGLE, LENGTH
 
-    allowed, words = (ANGLE, LENGTH), "an angle or a length, such as 0.1deg or 1mm"
-    moving = () if robot is None else robot.moving_joints
-    if moving and all(joint.turning for joint in moving):
-        allowed, words = (ANGLE,), "an angle, such as 0.1deg: all joints turn"
-    elif moving and all(joint.type == "prismatic" for joint in moving):
-        allowed, words = (LENGTH,), "a length, such as 1mm: all joints slide"
-    return positive_quantity("--deviation", text, allowed, words)
+    allowed, noun = (ANGLE, LENGTH), "an angle or a length, such as 0.1deg or 1mm"
+    moving_joints = () if robot is None else robot.moving_joints
+    if moving_joints and all(joint.turning for joint in moving_joints):
+        allowed, noun = (ANGLE,), "an angle, such as 0.1deg: all joints turn"
+    elif moving_joints and all(joint.type == "prismatic" for joint in moving_joints):
+        allowed, noun = (LENGTH,), "a length, such as 1mm: all joints slide"
+    return positive_quantity("--deviation", text, allowed, noun)
 
 
 def duration_of(text: str) -> float:

@@ -184,13 +184,13 @@ def _torques_at_breaks(robot: Any, motion: Any, rates: int, loads: Any, *, drive
     breaks = law_breaks(motion.laws.values(), first, last, rates + 2)
     changes = LoadedRobot(robot, loads, motion.start, motion.stop).changes
     breaks = distinct_instants(np.append(breaks, changes), first, last)
-    sides, which = both_sides(breaks, first, last)
+    sides, indices = both_sides(breaks, first, last)
     if not len(sides):
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)  # the message covers all instants
         torques_there = trajectory_torques(robot, motion, rates, times=sides, drives=drives, loads=loads)
-    return torques_there.assign_coords(time=breaks[which])
+    return torques_there.assign_coords(time=breaks[indices])
 
 
 def _smoothed(motion: Any, robot: Any, deviation: str | None, file: Path) -> Any:

@@ -75,7 +75,7 @@ def servo(
     names = list(dict.fromkeys(driver or mechanism.drivers))
     for name in names:
         check_name("driver", name, mechanism.drivers, JounceError, name="--driver")
-    shown = _units_of(mechanism, names)
+    shown_units = _units_of(mechanism, names)
     with errors_about(file), Count("solving") as bar:
         if not names:
             raise JounceError("there is no driver", name="drivers")
@@ -86,10 +86,10 @@ def servo(
     peaks = table_peaks(dataset, one_sided)
     if not output.json:
         count = f"{len(motion.time)} rows from {first:g} s to {last:g} s, {frequency:g} a second"
-        shorter = filter(None, [last_step_words(motion.time)])
-        print_text("\n".join([mechanism.title or file.name, count, *shorter, *law_words(laws)]))
-        show_peaks(shown_peaks(peaks, shown))
-    output.write(lambda: in_units(dataset, shown), header_units=units)
+        remarks = filter(None, [last_step_words(motion.time)])
+        print_text("\n".join([mechanism.title or file.name, count, *remarks, *law_words(laws)]))
+        show_peaks(shown_peaks(peaks, shown_units))
+    output.write(lambda: in_units(dataset, shown_units), header_units=units)
     output.tell("servo", lambda: _result(file, frequency, names, laws, peaks, output.out))
     return outcome(motion, file)
 
@@ -105,8 +105,8 @@ def _at_rate(mechanism: Mechanism, frequency: float, order: int, count: Count) -
     from jounce.mechanism import TimeGrid
     from jounce.mechanism.time import instants_of
 
-    known = instants_of(mechanism.time, mechanism.parameter_values)
-    first, last = float(known[0]), float(known[-1])
+    instants = instants_of(mechanism.time, mechanism.parameter_values)
+    first, last = float(instants[0]), float(instants[-1])
     grid = TimeGrid(first, last, 1 / frequency)
     return solve(mechanism, grid, order, strict=False, progress=count, keep=True)
 
@@ -121,11 +121,11 @@ def _values_at_breaks(mechanism: Mechanism, motion: Motion, names: list[str]) ->
 
     first, last = float(motion.time[0]), float(motion.time[-1])
     breaks = breaks_of_laws(mechanism, first, last, motion.order)
-    sides, which = both_sides(breaks, first, last)
+    sides, indices = both_sides(breaks, first, last)
     if not len(sides):
         return None
-    whole = solve(mechanism, np.append(first, sides), motion.order, strict=False)  # from the same start
-    return _driven(whole, names).isel(time=slice(1, None)).assign_coords(time=breaks[which])
+    solved = solve(mechanism, np.append(first, sides), motion.order, strict=False)  # from the same start
+    return _driven(solved, names).isel(time=slice(1, None)).assign_coords(time=breaks[indices])
 
 
 def _driven(motion: Motion, names: list[str]) -> Any:
@@ -143,9 +143,9 @@ def _units_of(mechanism: Mechanism, names: list[str]) -> ShownUnits:
     from jounce.mechanism.laws.driver_outputs import is_turning
     from jounce.units.shown_units import QUANTITIES, ShownUnits
 
-    known = {name: "rad" if is_turning(mechanism.drivers[name]) else "m" for name in names}
-    chosen = {name: unit for name, unit in mechanism.units.items() if name in QUANTITIES or name in known}
-    return ShownUnits(chosen, known)
+    base_units = {name: "rad" if is_turning(mechanism.drivers[name]) else "m" for name in names}
+    chosen = {name: unit for name, unit in mechanism.units.items() if name in QUANTITIES or name in base_units}
+    return ShownUnits(chosen, base_units)
 
 
 def _result(

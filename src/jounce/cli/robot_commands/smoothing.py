@@ -85,16 +85,16 @@ def smooth(
             f"{rows}from {interval_text(motion.start, motion.stop)}, within {allowed:.3g} rad or m of each sample"
         )
         show_table(smoothing_table(motion))
-        if words := smoothing_words(motion):
-            print_text(words)
+        if phrase := smoothing_words(motion):
+            print_text(phrase)
     if output.out is not None:
         output.write_parts(_parts(model, motion, times), len(times))
     if figure is not None:
         from jounce.plot import save
         from jounce.plot.charts.smoothing import draw_smoothing
 
-        drawn = draw_smoothing(given, motion, f"{trajectory.name} within {allowed:.3g} rad or m")
-        written(lambda: save(drawn, figure, overwrite=output.overwrite))
+        drawing = draw_smoothing(given, motion, f"{trajectory.name} within {allowed:.3g} rad or m")
+        written(lambda: save(drawing, figure, overwrite=output.overwrite))
     files = (output.out, figure)
     output.tell("smooth", lambda: smoothing_result(motion, (robot, trajectory), len(times), files))
     return 0

@@ -95,13 +95,13 @@ def high_speed() -> Samples:
 
 def sudden_stop() -> Samples:
     """Return the angular acceleration in a motion that stops from 0.9 s on, rad/s^2, one sample for each knot."""
-    turned = KNOTS - STOP
-    phase = np.clip(turned / BRAKING, 0.0, 1.0)
+    angles = KNOTS - STOP
+    phase = np.clip(angles / BRAKING, 0.0, 1.0)
     braking = -rest_to_rest(np.array([STOP]))[0] / BRAKING * (1 - np.cos(2 * np.pi * phase))
     size, frequency, decay = RINGING
-    after = np.clip(turned - BRAKING, 0.0, None)
+    after = np.clip(angles - BRAKING, 0.0, None)
     ringing = size * np.exp(-decay * after) * np.sin(frequency * after)
-    return np.where(turned < 0, rest_to_rest(KNOTS)[1], braking + ringing) + ripple(KNOTS)
+    return np.where(angles < 0, rest_to_rest(KNOTS)[1], braking + ringing) + ripple(KNOTS)
 
 
 def ripple(time: Samples) -> Samples:
@@ -160,10 +160,10 @@ def at_rest(accelerations: Samples, angle: float | None) -> Samples:
         Angle at which the motion ends at rest, rad; None if it is not known.
     """
     shapes = [np.ones(len(KNOTS)), KNOTS] if angle is not None else [np.ones(len(KNOTS))]
-    known = slice(None) if angle is not None else slice(1, 2)
-    target = np.array([angle or 0.0, 0.0])[known]
-    effect = np.stack([end_of(law(shape))[known] for shape in shapes], axis=1)
-    amounts = np.linalg.solve(effect, target - end_of(law(accelerations))[known])
+    columns = slice(None) if angle is not None else slice(1, 2)
+    target = np.array([angle or 0.0, 0.0])[columns]
+    effect = np.stack([end_of(law(shape))[columns] for shape in shapes], axis=1)
+    amounts = np.linalg.solve(effect, target - end_of(law(accelerations))[columns])
     return accelerations + amounts @ np.stack(shapes)
 
 

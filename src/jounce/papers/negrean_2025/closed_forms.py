@@ -30,11 +30,11 @@ def energies(inertia: float, motion: ArrayLike) -> Float[np.ndarray, "*batch 3"]
     [10.0, 82.0, 1480.0]
     """
     w, a, j, s = np.moveaxis(np.asarray(motion, float), -1, 0)[1:5]
-    first = a**2 + w**4
+    square = a**2 + w**4
     second = j**2 - 2 * w**3 * j + 9 * w**2 * a**2 + w**6
     third = s**2 + w**8 - 8 * w**5 * j + 30 * w**4 * a**2 - 12 * w**2 * a * s
     third = third + 16 * w**2 * j**2 + 24 * w * a**2 * j + 9 * a**4
-    return inertia / 2 * np.stack([first, second, third], axis=-1)
+    return inertia / 2 * np.stack([square, second, third], axis=-1)
 
 
 def gravity_torques(

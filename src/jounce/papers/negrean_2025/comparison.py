@@ -73,13 +73,13 @@ def stand_ins() -> str:
 def _differences(name: str, history: History) -> Iterator[tuple[str, ...]]:
     peaks = np.max(np.abs(history.closed_energies), axis=0)
     library = difference(history.energies, history.closed_energies)
-    for (what, unit), peak, d in zip(ENERGIES.items(), peaks, library, strict=True):
-        yield name, what, unit, f"{peak:.4g}", f"{d:.1e}", ""
+    for (noun, unit), peak, d in zip(ENERGIES.items(), peaks, library, strict=True):
+        yield name, noun, unit, f"{peak:.4g}", f"{d:.1e}", ""
     peaks = np.max(np.abs(history.closed_torques), axis=0)
     library = difference(history.torques, history.closed_torques)
     equations = difference(history.equation_torques, history.closed_torques)
-    for (what, unit), peak, d, e in zip(TORQUES.items(), peaks, library, equations, strict=True):
-        yield name, what, unit, f"{peak:.4g}", f"{d:.1e}", f"{e:.1e}"
+    for (noun, unit), peak, d, e in zip(TORQUES.items(), peaks, library, equations, strict=True):
+        yield name, noun, unit, f"{peak:.4g}", f"{d:.1e}", f"{e:.1e}"
 
 
 def jumps(history: History) -> Float[np.ndarray, "6"]:

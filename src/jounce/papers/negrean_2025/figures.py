@@ -26,11 +26,11 @@ ENERGY_COLORS = (BLUE, VERMILION, GREEN)
 
 def note_on_substitutes(case: Case) -> str:
     """Return a note on the stand-ins for data of the paper: samples, masses and lengths, unless files give them."""
-    chosen = [] if case.measured else ["samples"]
-    chosen += ["masses", "lengths"] if case.link is STAND_IN else []
-    if not chosen:
+    nouns = [] if case.measured else ["samples"]
+    nouns += ["masses", "lengths"] if case.link is STAND_IN else []
+    if not nouns:
         return ""
-    *others, last = chosen
+    *others, last = nouns
     first = f"{', '.join(others)} and " if others else ""
     return f"stand-in data: {first}{last} are not those of the paper"
 
@@ -53,10 +53,10 @@ def _panels(
 
 def accelerations(histories: Mapping[str, History], *, tangential: bool, number: int) -> Figure:
     """Draw the samples and the law through them, one panel for each motion (figures 4 and 5)."""
-    what = "Tangential acceleration" if tangential else "Generalized angular acceleration"
+    title = "Tangential acceleration" if tangential else "Generalized angular acceleration"
     unit = r"m/s$^2$" if tangential else r"rad/s$^2$"
     note = note_on_substitutes(_any_case(histories))
-    figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{what} (figure {number} of Negrean 2025)", note)
+    figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{title} (figure {number} of Negrean 2025)", note)
     for panel, history in zip(grid[:, 0], histories.values(), strict=True):
         factor = history.case.link.radius if tangential else 1.0
         panel.plot(history.time, factor * history.motion[:, 2], color=BLUE, label="quintic segments")
@@ -75,11 +75,11 @@ def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figur
     name, title, unit = TORQUES[rate]
     figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{title} (figure {number} of Negrean 2025)")
     for panel, history in zip(grid[:, 0], histories.values(), strict=True):
-        whole = history.torques[:, rate]
+        total = history.torques[:, rate]
         gravity = history.gravity[:, rate]
         inertial = {"color": VERMILION, "linestyle": "--", "linewidth": 1.1, "label": "share of inertia"}
-        panel.plot(history.time, whole, color=BLUE, label="driving torque", zorder=3)
-        panel.plot(history.time, whole - gravity, **inertial)
+        panel.plot(history.time, total, color=BLUE, label="driving torque", zorder=3)
+        panel.plot(history.time, total - gravity, **inertial)
         panel.plot(history.time, gravity, color=GREEN, linestyle=":", linewidth=1.3, label="share of gravity")
         panel.set_title(history.case.title)
         panel.set_ylabel(f"{name} / ({unit})")
@@ -94,11 +94,11 @@ def energies(histories: Mapping[str, History]) -> Figure:
     figure, grid = _panels(3, len(histories), (7.2, 6.0), title, note_on_substitutes(_any_case(histories)))
     for column, history in enumerate(histories.values()):
         for p, panel in enumerate(grid[:, column], 1):
-            computed, closed = history.energies[:, p - 1], history.closed_energies[:, p - 1]
+            computed, formula = history.energies[:, p - 1], history.closed_energies[:, p - 1]
             panel.plot(history.time, computed, color=ENERGY_COLORS[p - 1], label="library")
-            every = slice(None, None, STEPS)  # the knots
+            knots = slice(None, None, STEPS)  # the knots
             panel.plot(
-                history.time[every], closed[every], color=GRAY, marker="x", linestyle="", label="closed form", zorder=3
+                history.time[knots], formula[knots], color=GRAY, marker="x", linestyle="", label="closed form", zorder=3
             )
             panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
             if column == 0:

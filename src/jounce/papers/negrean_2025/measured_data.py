@@ -37,7 +37,7 @@ def given_cases(samples: Path | None, masses: Path | None, *, remove_gravity: bo
     JounceError
         If a file cannot be read, or does not describe a motion or a link.
     """
-    link, known = (STAND_IN, frozenset()) if masses is None else read_link(masses)
+    link, stated = (STAND_IN, frozenset()) if masses is None else read_link(masses)
     if samples is None:
         if remove_gravity:
             raise JounceError("there are no readings to take gravity off; give samples", name="remove_gravity")
@@ -46,7 +46,7 @@ def given_cases(samples: Path | None, masses: Path | None, *, remove_gravity: bo
     tangential = {name for name in units if any(base == "length" for base, _ in units[name])}
     cases = {}
     for name, values in columns.items():
-        if name in tangential and "radius" not in known:
+        if name in tangential and "radius" not in stated:
             message = "tangential accelerations need the radius of the accelerometer; give radius in the file of masses"
             raise MechanismFileError(message, path=samples, name=name)
         if remove_gravity and name not in tangential:

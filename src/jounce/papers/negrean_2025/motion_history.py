@@ -68,7 +68,7 @@ def history(case: Case) -> History:
     motion = np.asarray(case.motion(Jet.variable(jnp.asarray(time), ORDER)).derivatives()).T
     q = motion[:, :, None]
     energies = [acceleration_energy(robot, q[:, : p + 2], order=p).total[..., 0] for p in (1, 2, 3)]
-    against = np.asarray(gravity_forces(robot, q, rates=2))[..., 0]
+    gravity_torques = np.asarray(gravity_forces(robot, q, rates=2))[..., 0]
     inertial = [np.asarray(higher_order(robot, q, k))[..., 0] for k in (1, 2, 3)]
     weight = -float(robot.gravity[2])
     closed_gravity = closed_forms.gravity_torques(link.mass, (link.center_x, link.center_z), weight, motion)
@@ -80,13 +80,13 @@ def history(case: Case) -> History:
         closed_forms.energies(inertia, motion),
         np.asarray(inverse_dynamics(robot, q[:, :5]))[..., 0],
         closed_forms.torques(inertia, motion, closed_gravity),
-        np.stack(inertial, axis=-1) + against,
+        np.stack(inertial, axis=-1) + gravity_torques,
         closed_gravity,
     )
 
 
 def difference(
-    computed: Float[np.ndarray, "time column"], right: Float[np.ndarray, "time column"]
+    computed: Float[np.ndarray, "time column"], expected: Float[np.ndarray, "time column"]
 ) -> Float[np.ndarray, " column"]:
     """Return the largest differences over time, divided by the largest values, one for each column."""
-    return np.max(np.abs(computed - right), axis=0) / np.max(np.abs(right), axis=0)
+    return np.max(np.abs(computed - expected), axis=0) / np.max(np.abs(expected), axis=0)

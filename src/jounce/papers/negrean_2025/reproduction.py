@@ -60,9 +60,9 @@ def reproduce(
     """
     files = [None if path is None else Path(path) for path in (samples, masses)]
     remove_gravity = flag("remove_gravity", remove_gravity, error=JounceError)
-    own = files != [None, None] or remove_gravity
-    cases = given_cases(*files, remove_gravity=remove_gravity) if own else CASES
-    data = summary(cases, *files, remove_gravity=remove_gravity) if own else None
+    has_own_data = files != [None, None] or remove_gravity
+    cases = given_cases(*files, remove_gravity=remove_gravity) if has_own_data else CASES
+    data = summary(cases, *files, remove_gravity=remove_gravity) if has_own_data else None
     directory = writable(Path(out_directory))
     from jounce.papers.negrean_2025 import figures  # imports matplotlib
 

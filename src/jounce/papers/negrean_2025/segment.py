@@ -68,8 +68,8 @@ def check() -> list[Check]:
         before, printed = POLYNOMIALS[order - 1], POLYNOMIALS[order]
         for power, coefficient in zip(range(len(printed) - 1, -1, -1), printed, strict=True):
             factor = power + 1
-            derived = factor * Decimal(before[len(before) - 1 - factor])
-            rows.append(Check(order, power, Decimal(coefficient), derived, (factor + 1) * HALF_UNIT))
+            slope = factor * Decimal(before[len(before) - 1 - factor])
+            rows.append(Check(order, power, Decimal(coefficient), slope, (factor + 1) * HALF_UNIT))
     return rows
 
 

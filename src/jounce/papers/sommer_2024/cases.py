@@ -120,14 +120,14 @@ class Cycle:
         return normalized_rmse(self.simulated, self.explicit)[1:]
 
 
-def rmse(computed: Table, right: Table) -> Columns:
+def rmse(computed: Table, expected: Table) -> Columns:
     """Return the root-mean-square error over time, the first axis."""
-    return np.sqrt(np.mean((computed - right) ** 2, axis=0))
+    return np.sqrt(np.mean((computed - expected) ** 2, axis=0))
 
 
-def normalized_rmse(computed: Table, right: Table) -> Columns:
+def normalized_rmse(computed: Table, expected: Table) -> Columns:
     """Return the root-mean-square error over time divided by the largest absolute value (Sommer 2024, section 4)."""
-    return rmse(computed, right) / np.max(np.abs(right), axis=0)
+    return rmse(computed, expected) / np.max(np.abs(expected), axis=0)
 
 
 def nominal_time() -> Times:
@@ -156,14 +156,14 @@ def step_errors(case: ValidationCase, mechanism: Mechanism, step: float) -> dict
     """
     time, centers = stencil_instants(step)
     computed = case.simulated(mechanism, time)
-    right = case.explicit(mechanism, time[centers])[:, 3:]
-    errors = {"simulation": normalized_rmse(computed[centers, 3:], right)}
+    expected = case.explicit(mechanism, time[centers])[:, 3:]
+    errors = {"simulation": normalized_rmse(computed[centers, 3:], expected)}
     for name, accuracy in (("second order", 2), ("fourth order", 4)):
         estimates = [
             central_difference(computed[:, 2], step, derivative=derivative, accuracy=accuracy, at=centers)
             for derivative in (1, 2)
         ]
-        errors[name] = normalized_rmse(np.stack(estimates, axis=1), right)
+        errors[name] = normalized_rmse(np.stack(estimates, axis=1), expected)
     return errors
 
 

@@ -68,9 +68,9 @@ def _verdicts(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
             judge = (
                 _history if figure in cases.HISTORIES else _tolerances if figure in cases.TOLERANCE_SWEEPS else _steps
             )
-            result, confirmed, but = judge([results[name] for name in names], figure)
+            result, confirmed, remark = judge([results[name] for name in names], figure)
             chosen = {STANDS_IN[name] for name in names} - {""}
-            verdict = ("reproduced" if confirmed else "NOT reproduced") + but
+            verdict = ("reproduced" if confirmed else "NOT reproduced") + remark
             verdict += f"; {', '.join(sorted(chosen))}: stand-in" if chosen else ""
             yield str(figure), result, verdict
 
@@ -98,24 +98,24 @@ def _tolerances(results: Sequence[Results], figure: int) -> tuple[str, bool, str
     text += f", reached at tolerances to {max(reached):.0e}" if reached else ""
     if results[0].stop == "correction":
         return text, spread < ALIKE and floor <= FLOOR, "; the floor begins at another tolerance, see below"
-    begins = PRINTED_FLOORS.get(figure, cases.TOLERANCES[0])
-    begins_alike = bool(reached) and max(reached) >= begins * (1 - ALMOST)
-    return text, begins_alike, f"; the paper has it at {begins:.0e}" if figure in PRINTED_FLOORS else ""
+    floors = PRINTED_FLOORS.get(figure, cases.TOLERANCES[0])
+    begins_alike = bool(reached) and max(reached) >= floors * (1 - ALMOST)
+    return text, begins_alike, f"; the paper has it at {floors:.0e}" if figure in PRINTED_FLOORS else ""
 
 
 def _steps(results: Sequence[Results], _: int) -> tuple[str, bool, str]:
     """Judge a sweep of steps: differences converge at their orders, the simulation does not depend on the step."""
     steps = np.array(cases.STEPS)
-    between = (steps > CONVERGING[0]) & (steps < CONVERGING[1])
+    in_range = (steps > CONVERGING[0]) & (steps < CONVERGING[1])
     slopes = {}
     for method in ("second order", "fourth order"):
-        errors = np.log([result.by_step[method][between] for result in results])  # simulation, step, quantity
-        slopes[method] = np.array([np.polyfit(np.log(steps[between]), error, 1)[0] for error in errors])
+        errors = np.log([result.by_step[method][in_range] for result in results])  # simulation, step, quantity
+        slopes[method] = np.array([np.polyfit(np.log(steps[in_range]), error, 1)[0] for error in errors])
     worst = max(float(result.by_step["simulation"].max()) for result in results)
     second, fourth = (f"{slopes[m].min():.2f} to {slopes[m].max():.2f}" for m in ("second order", "fourth order"))
     text = f"differences converge with order {second} and {fourth}; simulation at most {worst:.1g} at every step"
-    right = all(np.abs(slopes[m] - p).max() < 0.1 for m, p in (("second order", 2), ("fourth order", 4)))
-    return text, right and worst <= FLOOR, ""
+    is_right = all(np.abs(slopes[m] - p).max() < 0.1 for m, p in (("second order", 2), ("fourth order", 4)))
+    return text, is_right and worst <= FLOOR, ""
 
 
 def _errors(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
@@ -132,7 +132,7 @@ def _errors(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
 def _lags(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
     for name, result in results.items():
         for lag in result.lags:
-            late, wrong = lag.late(lag.difference), lag.measured_error(lag.difference)
-            lag_cells = f"{late:.6g}", f"{lag.expected:g}", f"{wrong:.4g}", f"{lag.error:.4g}"
-            ours = f"{abs(lag.late(lag.simulated)):.0e}", f"{lag.measured_error(lag.simulated):.1e}"
-            yield cases.VALIDATION_CASES[name].title, lag.quantity, f"{lag.step:g}", *lag_cells, *ours
+            delay, error = lag.late(lag.difference), lag.measured_error(lag.difference)
+            lag_cells = f"{delay:.6g}", f"{lag.expected:g}", f"{error:.4g}", f"{lag.error:.4g}"
+            values = f"{abs(lag.late(lag.simulated)):.0e}", f"{lag.measured_error(lag.simulated):.1e}"
+            yield cases.VALIDATION_CASES[name].title, lag.quantity, f"{lag.step:g}", *lag_cells, *values

@@ -117,8 +117,8 @@ def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
     for letter, point in positions.items():
         name(letter, point, "black", f"bodies.{letter}")
     for symbol, (vertex, start, quarter, arm) in drawn.angles.items():
-        reach = positions[arm] - positions[vertex]
-        angle, radius = np.arctan2(reach @ quarter, reach @ start), ARC * drawing.unit
+        arms = positions[arm] - positions[vertex]
+        angle, radius = np.arctan2(arms @ quarter, arms @ start), ARC * drawing.unit
         turns = np.linspace(0.0, angle, 31)[:, None]
         arc = positions[vertex] + radius * (np.cos(turns) * start + np.sin(turns) * quarter)
         line(arc, width=0.9)

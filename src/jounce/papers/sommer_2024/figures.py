@@ -47,21 +47,21 @@ def time_history(results: Mapping[str, Results], *, name: str, quantity: str, nu
     """Draw a derivative of the output over one cycle, and below it the error of its simulation (figures 2 and 3)."""
     cycle, unit = results[name].cycle, RATE_UNITS[quantity]
     derivative = 1 + cases.QUANTITIES.index(quantity)
-    computed, right = cycle.simulated[:, derivative], cycle.explicit[:, derivative]
+    computed, expected = cycle.simulated[:, derivative], cycle.explicit[:, derivative]
     title = f"{cases.VALIDATION_CASES[name].title}: {quantity} of the output angle (figure {number} of Sommer 2024)"
     figure, axes = panels(2, 1, (6.0, 4.8), title, sharex=True)
-    above, below = axes[:, 0]
-    above.plot(cycle.time, computed, color=BLUE)
-    above.set_ylabel(f"{quantity} / ({unit})")
-    below.plot(cycle.time, computed - right, color=VERMILION, linewidth=0.9)
+    upper, lower = axes[:, 0]
+    upper.plot(cycle.time, computed, color=BLUE)
+    upper.set_ylabel(f"{quantity} / ({unit})")
+    lower.plot(cycle.time, computed - expected, color=VERMILION, linewidth=0.9)
     index = derivative - 1
-    below.set_ylabel(f"error / ({unit})")
-    below.set_title(
+    lower.set_ylabel(f"error / ({unit})")
+    lower.set_title(
         f"simulation minus explicit solution, RMSE {cycle.rmse[index]:.2g} {unit}"
         f" ({cycle.normalized_rmse[index]:.1g} of the largest value)",
     )
-    below.set_xlabel("time / s")
-    below.set_xlim(cycle.time[0], cycle.time[-1])
+    lower.set_xlabel("time / s")
+    lower.set_xlim(cycle.time[0], cycle.time[-1])
     figure.align_ylabels()
     return figure
 
@@ -75,8 +75,8 @@ TOLERANCE_OF = {
 def tolerance_sweep(results: Mapping[str, Results], *, names: Sequence[str], number: int) -> Figure:
     """Draw the errors against the assembly tolerance, one panel per simulation (figures 4, 6, 10 and 12)."""
     title = f"Error against assembly tolerance (figure {number} of Sommer 2024)"
-    wide = 1.0 + 3.6 * len(names) + (0.8 if len(names) == 1 else 0)
-    figure, axes = panels(1, len(names), (wide, 3.9), title, _note(names), sharex=True, sharey=True)
+    width = 1.0 + 3.6 * len(names) + (0.8 if len(names) == 1 else 0)
+    figure, axes = panels(1, len(names), (width, 3.9), title, _note(names), sharex=True, sharey=True)
     for panel, name in zip(axes[0], names, strict=True):
         for k, quantity in enumerate(cases.QUANTITIES):
             panel.loglog(cases.TOLERANCES, results[name].by_tolerance[:, k], label=quantity, **LINE_STYLES[quantity])
@@ -95,8 +95,8 @@ def tolerance_sweep(results: Mapping[str, Results], *, names: Sequence[str], num
 def step_sweep(results: Mapping[str, Results], *, names: Sequence[str], number: int) -> Figure:
     """Draw the errors of jerk (top) and jounce (bottom) against the time step (figures 5, 7, 11 and 13)."""
     title = f"Error against time step (figure {number} of Sommer 2024)"
-    wide = 1.0 + 3.6 * len(names) + (1.4 if len(names) == 1 else 0)
-    figure, axes = panels(2, len(names), (wide, 6.2), title, sharex=True, sharey=True)
+    width = 1.0 + 3.6 * len(names) + (1.4 if len(names) == 1 else 0)
+    figure, axes = panels(2, len(names), (width, 6.2), title, sharex=True, sharey=True)
     for column, name in enumerate(names):
         for row, quantity in enumerate(("jerk", "jounce")):
             panel: Axes = axes[row, column]
@@ -137,9 +137,9 @@ def phase_lag(results: Mapping[str, Results], *, name: str, step: float) -> Figu
     return figure
 
 
-def _decades(axis: Any, every: int) -> None:
+def _decades(axis: Any, interval: int) -> None:
     """Mark every few decades, without minor ticks."""
-    axis.set_major_locator(LogLocator(base=10.0**every, numticks=20))
+    axis.set_major_locator(LogLocator(base=10.0**interval, numticks=20))
     axis.set_minor_locator(LogLocator(base=10.0, numticks=40))
     axis.set_minor_formatter(NullFormatter())
 

@@ -123,9 +123,9 @@ def evaluate(
     >>> psi.shape, f"{np.cos(psi[0, 0]):.12f}"
     ((2, 2), '-0.142857142857')
     """
-    whole = np.pad(time, (0, -len(time) % LANES), mode="edge").reshape(-1, LANES)
+    padded = np.pad(time, (0, -len(time) % LANES), mode="edge").reshape(-1, LANES)
     values = {name: float(value) for name, value in parameters.items()}
-    parts = [np.asarray(_derivatives(form, part, values, order)) for part in whole]
+    parts = [np.asarray(_derivatives(form, part, values, order)) for part in padded]
     rows = np.concatenate(parts, axis=1)[:, : len(time)].T
     return np.concatenate([np.unwrap(rows[:, :1], axis=0), rows[:, 1:]], axis=1)
 

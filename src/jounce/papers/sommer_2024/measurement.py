@@ -86,5 +86,5 @@ def measure(case: ValidationCase, advanced: Callable[[], None] = lambda: None, *
         stopped = lambda *run: sweep.error(run[-1])  # noqa: E731 - the sweep has the case and its mechanism
     by_tolerance, by_step = each(stopped, TOLERANCES), each(step_errors, STEPS)
     methods = {name: np.stack([errors[name] for errors in by_step]) for name in by_step[0]}
-    late = each(lags, LAG_STEPS)
-    return Results(cycle, np.stack(by_tolerance), methods, [lag for pair in late for lag in pair], stop)
+    lag_pairs = each(lags, LAG_STEPS)
+    return Results(cycle, np.stack(by_tolerance), methods, [lag for pair in lag_pairs for lag in pair], stop)

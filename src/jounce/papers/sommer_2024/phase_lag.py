@@ -53,9 +53,9 @@ class Lag:
 
     def late(self, computed: Series) -> float:
         """Return the delay of a quantity, s, in the largest harmonic of the explicit solution."""
-        right = np.fft.rfft(self.explicit)
-        n = 1 + int(np.argmax(np.abs(right[1:])))
-        return -float(np.angle(np.fft.rfft(computed)[n] / right[n])) * CYCLE / (2 * np.pi * n)
+        expected = np.fft.rfft(self.explicit)
+        n = 1 + int(np.argmax(np.abs(expected[1:])))
+        return -float(np.angle(np.fft.rfft(computed)[n] / expected[n])) * CYCLE / (2 * np.pi * n)
 
     def measured_error(self, computed: Series) -> float:
         """Return the normalized RMSE of a quantity."""
@@ -76,16 +76,16 @@ def lags(case: ValidationCase, mechanism: Mechanism, step: float) -> list[Lag]:
     """
     count = round(CYCLE / step)
     time = step * np.arange(count + 2)  # two samples before the first difference
-    computed, right = case.simulated(mechanism, time), case.explicit(mechanism, time)
-    fine = case.explicit(mechanism, CYCLE / FINE * np.arange(FINE))
+    computed, expected = case.simulated(mechanism, time), case.explicit(mechanism, time)
+    dense = case.explicit(mechanism, CYCLE / FINE * np.arange(FINE))
     frequency = 2 * np.pi / CYCLE * np.arange(FINE // 2 + 1)
     transfer = np.sinc(frequency * step / (2 * np.pi)) * np.exp(-0.5j * frequency * step)
-    every = []
+    all_lags = []
     for derivative, quantity in ((1, "jerk"), (2, "jounce")):
         k = 1 + QUANTITIES.index(quantity)
-        spectrum = np.fft.rfft(fine[:, k]) / FINE
-        lost = np.abs((1 - transfer**derivative) * spectrum) ** 2
-        error = float(np.sqrt(lost[0] + 2 * lost[1:].sum()) / np.abs(right[2:, k]).max())
+        spectrum = np.fft.rfft(dense[:, k]) / FINE
+        loss = np.abs((1 - transfer**derivative) * spectrum) ** 2
+        error = float(np.sqrt(loss[0] + 2 * loss[1:].sum()) / np.abs(expected[2:, k]).max())
         difference = backward_difference(computed[:, 2], step, derivative=derivative)[2 - derivative :]
-        every.append(Lag(quantity, step, time[2:], right[2:, k], computed[2:, k], difference, error))
-    return every
+        all_lags.append(Lag(quantity, step, time[2:], expected[2:, k], computed[2:, k], difference, error))
+    return all_lags

@@ -72,11 +72,11 @@ class ResidualStop:
         positions = self.start
         for _ in range(MOST):
             size, corrected = _corrected(self.system, positions, self.time, self.pose_type)
-            going = np.asarray(size) > tolerance
-            if not going.any():
+            is_moving = np.asarray(size) > tolerance
+            if not is_moving.any():
                 break
             pairs = ((name, values, corrected[name]) for name, values in positions.items())
-            positions = {name: np.where(going, np.asarray(moved), values) for name, values, moved in pairs}
+            positions = {name: np.where(is_moving, np.asarray(moved), values) for name, values, moved in pairs}
         series = _outputs(self.system, positions, self.time, self.pose_type, self.output[0])
         return np.asarray(plain_derivatives(np.asarray(series)[:, 0, self.output[1]])).T
 
@@ -104,8 +104,8 @@ def _corrected(system: System, bodies: Coordinates, instants: Lanes, pose_type: 
     pose, time = pose_of(bodies, pose_type, 0), Jet([instants[None]])
     residual = system.residual(pose, time).coefficients[0]
     solution = factored(system, pose, time).solve(-residual)
-    moved = pose.displaced(*system.coordinates(solution, pose.shifts))
-    return jnp.max(jnp.abs(residual), axis=0), {name: stacked(jet) for name, jet in moved.coordinates().items()}
+    displaced = pose.displaced(*system.coordinates(solution, pose.shifts))
+    return jnp.max(jnp.abs(residual), axis=0), {name: stacked(jet) for name, jet in displaced.coordinates().items()}
 
 
 @compiled("pose_type", "group")

@@ -77,7 +77,7 @@ def draw_bands(spread: xarray.Dataset, columns: Sequence[Column], title: str = "
 def _draw_row(spread: Any, column: Column, panels: Any, parameters: list[str]) -> None:
     name, component, order = column
     time = spread["time"].values
-    value, deviation, share = panels
+    value, deviation, variance = panels
     nominal = chosen(spread, name, column)
     exponent = scale_of(nominal)
     label = symbol(name, order, component) or shown_name(f"{name} {component}".strip())
@@ -87,25 +87,25 @@ def _draw_row(spread: Any, column: Column, panels: Any, parameters: list[str]) -
     bounds = [chosen(spread, f"{name}_{side}", column) for side in ("low", "high") if f"{name}_{side}" in spread]
     linear = f"{name}_linear_std"
     sides = [chosen(spread, linear, column) * TWO_SIDED * sign for sign in (-1, 1)] if linear in spread else []
-    away = scale_of(np.concatenate([*(bound - nominal for bound in bounds), *sides, np.zeros(1)]))
+    scaled = scale_of(np.concatenate([*(bound - nominal for bound in bounds), *sides, np.zeros(1)]))
     if bounds:
         value.fill_between(time, *(x * 10.0**-exponent for x in bounds), color=LINE_COLORS[0], alpha=BAND, linewidth=0)
-        differences = [(x - nominal) * 10.0**-away for x in bounds]
+        differences = [(x - nominal) * 10.0**-scaled for x in bounds]
         deviation.fill_between(time, *differences, color=LINE_COLORS[0], alpha=BAND, linewidth=0, label="samples")
     for side in sides:
         entry = "first order" if side is sides[0] else None
-        deviation.plot(time, side * 10.0**-away, color=GRAY, linewidth=0.9, linestyle=(0, (4, 2)), label=entry)
+        deviation.plot(time, side * 10.0**-scaled, color=GRAY, linewidth=0.9, linestyle=(0, (4, 2)), label=entry)
     deviation.axhline(0.0, color=LINE_COLORS[0], linewidth=0.8)
-    deviation.set_ylabel(rf"$\Delta$ {label}  ({unit_label(units, order, away)})")
+    deviation.set_ylabel(rf"$\Delta$ {label}  ({unit_label(units, order, scaled)})")
     if f"{name}_share" in spread:
         parts = chosen(spread, f"{name}_share", column)
         first = np.argsort(-parts.mean(axis=1), kind="stable")[:MOST_SHARES]
         ordered = [k for k in range(len(parameters)) if k in first]  # one color in all rows
         colors = [LINE_COLORS[k % len(LINE_COLORS)] for k in ordered]
         names = [shown_name(parameters[k]) for k in ordered]
-        share.stackplot(time, parts[ordered], labels=names, colors=colors, alpha=0.75, linewidth=0)
-    share.set_ylim(0.0, 1.0)
-    share.set_ylabel(f"of {label}")
+        variance.stackplot(time, parts[ordered], labels=names, colors=colors, alpha=0.75, linewidth=0)
+    variance.set_ylim(0.0, 1.0)
+    variance.set_ylabel(f"of {label}")
     for axes in panels:
         axes.set_xlim(time[0], time[-1])
         set_ticks(axes.yaxis, 5)

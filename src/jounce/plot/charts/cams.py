@@ -53,22 +53,22 @@ def draw_cam(cam: PlateCam, units: Mapping[str, str] | ShownUnits | None = None)
     """
     if not isinstance(cam, PlateCam):
         raise MechanismError("must be a jn.cams.PlateCam", name="cam", value=cam)
-    shown = cam.shown_units if units is None else units
-    shown = shown if isinstance(shown, ShownUnits) else cam.shown_units.merged(shown)
+    shown_units = cam.shown_units if units is None else units
+    shown_units = shown_units if isinstance(shown_units, ShownUnits) else cam.shown_units.merged(shown_units)
     with style():
         figure = blank_figure(WIDTH, HEIGHT, cam.title)
         grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
         sketch = figure.add_subplot(grid[:, 0])
-        _draw_profile(sketch, cam, shown)
+        _draw_profile(sketch, cam, shown_units)
         panels = [figure.add_subplot(grid[row, 1]) for row in range(3)]
-        _draw_curves(panels, cam, shown)
+        _draw_curves(panels, cam, shown_units)
         figure.align_ylabels(panels)
     return figure
 
 
-def _draw_profile(axes: Any, cam: PlateCam, shown: ShownUnits) -> None:
+def _draw_profile(axes: Any, cam: PlateCam, shown_units: ShownUnits) -> None:
     """Draw the cam at cam angle zero, with its pitch curve, base circle and follower."""
-    unit, factor = shown.of("m")
+    unit, factor = shown_units.of("m")
     table, turn = cam.table, np.linspace(0, 2 * np.pi, 181)
     base = cam.base_radius * factor
     axes.plot(base * np.cos(turn), base * np.sin(turn), color=PALE_GRAY, linewidth=0.8, linestyle=":")
@@ -77,9 +77,14 @@ def _draw_profile(axes: Any, cam: PlateCam, shown: ShownUnits) -> None:
         axes.plot(*(table.pitch * factor), color=GRAY, linewidth=0.8, linestyle="--")
     axes.fill(x, y, color=BLUE, alpha=0.12, linewidth=0)
     axes.plot(x, y, color=BLUE, linewidth=1.4)
-    lost = (cam.table.lift - cam.followed_lift) > 0
-    back = table.forward < 0
-    axes.plot(np.where(lost | back, x, np.nan), np.where(lost | back, y, np.nan), color=VERMILION, linewidth=2.0)
+    is_cut = (cam.table.lift - cam.followed_lift) > 0
+    is_reversed = table.forward < 0
+    axes.plot(
+        np.where(is_cut | is_reversed, x, np.nan),
+        np.where(is_cut | is_reversed, y, np.nan),
+        color=VERMILION,
+        linewidth=2.0,
+    )
     axes.plot(0, 0, marker="+", color=GRAY, markersize=8)
     _draw_follower(axes, cam, factor)
     sign = SIGNS[cam.sense]
@@ -126,18 +131,18 @@ def _draw_follower(axes: Any, cam: PlateCam, factor: float) -> None:
         axes.plot(center[0] + radius * np.cos(turn), center[1] + radius * np.sin(turn), **line)
 
 
-def _draw_curves(panels: Any, cam: PlateCam, shown: ShownUnits) -> None:
+def _draw_curves(panels: Any, cam: PlateCam, shown_units: ShownUnits) -> None:
     """Draw lift, pressure angle and radius of curvature over the cam angle."""
     table = cam.table
-    angle_unit, by_angle = shown.of("rad", "angle")
-    lift_unit, by_lift = shown.of("rad" if cam.follower.turning else "m", "lift")
-    pressure_unit, by_pressure = shown.of("rad", "pressure_angle")
-    length_unit, by_length = shown.of("m")
+    angle_unit, by_angle = shown_units.of("rad", "angle")
+    lift_unit, by_lift = shown_units.of("rad" if cam.follower.turning else "m", "lift")
+    pressure_unit, by_pressure = shown_units.of("rad", "pressure_angle")
+    length_unit, by_length = shown_units.of("m")
     angle = cam.angle * by_angle
-    most = MOST_RADII * cam.base_radius
+    limit = MOST_RADII * cam.base_radius
     with np.errstate(divide="ignore", invalid="ignore"):
         radius = 1.0 / table.curvature
-    radius = np.where(np.abs(radius) > most, np.nan, radius) * by_length
+    radius = np.where(np.abs(radius) > limit, np.nan, radius) * by_length
     rows = [
         (table.lift * by_lift, f"lift ({lift_unit})"),
         (table.pressure_angle * by_pressure, f"pressure angle ({pressure_unit})"),

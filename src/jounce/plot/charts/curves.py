@@ -50,28 +50,28 @@ def draw_curves(curves: Curve | Sequence[Curve], outputs: Sequence[str] | None =
     >>> [axes.get_xlabel() for axes in figure.axes]
     ['theta  (rad)', '$C_{x}$  (m)']
     """
-    several = [curves] if isinstance(curves, Curve) else list(curves)
-    if not several:
+    curve_list = [curves] if isinstance(curves, Curve) else list(curves)
+    if not curve_list:
         raise MechanismError("there is no curve to draw", name="curves", value=[])
-    known = several[0].outputs
+    given_outputs = curve_list[0].outputs
     for name in outputs or ():
-        check_name("output", name, known, MechanismError, name="outputs")
-    panels = _panels(several[0], list(outputs or known))
+        check_name("output", name, given_outputs, MechanismError, name="outputs")
+    panels = _panels(curve_list[0], list(outputs or given_outputs))
     if not panels:
         raise MechanismError("there is nothing to draw; name some outputs", name="outputs")
-    title = several[0].mechanism.title
+    title = curve_list[0].mechanism.title
     with style():
-        wide = min(len(panels), 3)
-        tall = -(-len(panels) // wide)
-        figure = blank_figure(SIDE * wide + 0.5, SIDE * tall + 0.4 + 0.3 * (len(several) > 1), title)
-        grid = np.atleast_1d(figure.subplots(tall, wide)).ravel()
+        width = min(len(panels), 3)
+        height = -(-len(panels) // width)
+        figure = blank_figure(SIDE * width + 0.5, SIDE * height + 0.4 + 0.3 * (len(curve_list) > 1), title)
+        grid = np.atleast_1d(figure.subplots(height, width)).ravel()
         for axes in grid[len(panels) :]:
             axes.set_axis_off()
         for axes, panel in zip(grid, panels, strict=False):
-            _draw_panel(axes, several, *panel)
-        if len(several) > 1:
+            _draw_panel(axes, curve_list, *panel)
+        if len(curve_list) > 1:
             handles, labels = grid[0].get_legend_handles_labels()
-            figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(several)))
+            figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(curve_list)))
     return figure
 
 
@@ -98,15 +98,17 @@ def _draw_panel(axes: Any, curves: Sequence[Curve], name: str, pair: tuple[int, 
     unit = unit_label(shown, 0, exponent)
     for number, curve in enumerate(curves):
         values = curve.outputs[name][:, 0] * factor * 10.0**-exponent
-        along = curve.arc_lengths if curve.driver is None else curve.values[:, 0]
-        x, y = (values[:, k] for k in pair) if pair else (along, values)
+        x_values = curve.arc_lengths if curve.driver is None else curve.values[:, 0]
+        x, y = (values[:, k] for k in pair) if pair else (x_values, values)
         color = LINE_COLORS[number % len(LINE_COLORS)]
         axes.plot(x, y, color=color, label=f"circuit {number + 1}")
         marks = [(point.arc_length, MARKS[point.kind]) for point in curve.limits]
         marks += [(point.arc_length, "x") for point in curve.change_points]
         for arc_length, mark in marks:
-            at = int(np.argmin(np.abs(curve.arc_lengths - arc_length)))
-            axes.plot(x[at], y[at], marker=mark, color=GRAY, fillstyle="none", markersize=5.5, linestyle="", zorder=4)
+            index = int(np.argmin(np.abs(curve.arc_lengths - arc_length)))
+            axes.plot(
+                x[index], y[index], marker=mark, color=GRAY, fillstyle="none", markersize=5.5, linestyle="", zorder=4
+            )
     if pair:
         for label, k in zip((axes.set_xlabel, axes.set_ylabel), pair, strict=True):
             label(f"{symbol(name, 0, output.labels[k]) or shown_name(name)}  ({unit})")

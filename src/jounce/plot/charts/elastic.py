@@ -60,14 +60,14 @@ def draw_feedforward(feedforward: Feedforward, errors: LinkErrors, title: str = 
         figure = blank_figure(WIDTH, PANEL * (len(panels) + 1) + 0.5, title or feedforward.title)
         axes_column = figure.subplots(len(panels) + 1, 1, sharex=True, squeeze=False)[:, 0]
         chosen = evenly_chosen(np.arange(len(feedforward.time)), DRAWN)
-        for axes, (turning, joints) in zip(axes_column, panels, strict=False):
+        for axes, (are_angles, joints) in zip(axes_column, panels, strict=False):
             axes.axhline(0.0, color=PALE_GRAY, linewidth=0.7, zorder=1)
             for k in joints:
                 rounds, color = divmod(int(k), len(LINE_COLORS))
                 line = {"color": LINE_COLORS[color], "linestyle": DASHES[rounds % len(DASHES)]}
                 values = 1e3 * feedforward.deflection[chosen, 0, k]
                 axes.plot(feedforward.time[chosen], values, label=shown_name(feedforward.names[k]), **line)
-            axes.set_ylabel(f"deflection\n({'mrad' if turning else 'mm'})")
+            axes.set_ylabel(f"deflection\n({'mrad' if are_angles else 'mm'})")
             set_ticks(axes.yaxis, 5)
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, handlelength=1.8)
         _draw_errors(errors, axes_column[-1])

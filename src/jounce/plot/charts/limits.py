@@ -66,8 +66,8 @@ def draw_limits(report: LimitReport, title: str = "") -> Figure:
     with style():
         joints = np.flatnonzero(limited.any(axis=0))
         legend = 0.22 * -(-len(joints) // _per_line(report, joints))
-        tall = ROW * lines + 0.75 + legend
-        figure = blank_figure(WIDTH, tall, title or report.robot, h_pad=0.06, hspace=0.02, wspace=0.03)
+        height = ROW * lines + 0.75 + legend
+        figure = blank_figure(WIDTH, height, title or report.robot, h_pad=0.06, hspace=0.02, wspace=0.03)
         grid = figure.subplots(lines, columns, sharex=True, squeeze=False)
         axes_list = [*grid.T.reshape(-1)]  # the derivatives of the position one below the other
         for axes in axes_list[len(rows) :]:
@@ -100,8 +100,8 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
         axes.plot(report.times[chosen], shares[:, joint], **_line_style(joint))
     worst = max(_rows_of(report, quantity), key=lambda row: row.ratio or 0.0)
     side = 1 if _is_upper(report, worst) else -1
-    at = side * BEYOND * max(1.0, float(np.nanmax(np.abs(shares)))) if worst.infinite else side * (worst.ratio or 0.0)
-    low, high = min(-1.0, at, float(np.nanmin(shares))), max(1.0, at, float(np.nanmax(shares)))
+    tip = side * BEYOND * max(1.0, float(np.nanmax(np.abs(shares)))) if worst.infinite else side * (worst.ratio or 0.0)
+    low, high = min(-1.0, tip, float(np.nanmin(shares))), max(1.0, tip, float(np.nanmax(shares)))
     margin = 0.08 * (high - low)
     axes.set_ylim(low - margin, high + margin)
     axes.set_xlim(report.times[0], report.times[-1])
@@ -110,11 +110,11 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
         axes.axhspan(sign, sign * (abs(low) + abs(high) + margin), color=FORBIDDEN, linewidth=0, zorder=0)
     axes.axhline(0.0, color=PALE_GRAY, linewidth=0.7, zorder=1)
     mark = ("^" if side > 0 else "v") if worst.infinite else "o"
-    axes.plot([worst.time], [at], marker=mark, markersize=4, color="black", fillstyle="none", zorder=5, clip_on=False)
+    axes.plot([worst.time], [tip], marker=mark, markersize=4, color="black", fillstyle="none", zorder=5, clip_on=False)
     set_ticks(axes.yaxis, 5, least=3)
     set_ticks(axes.xaxis, 6)
-    words = " / ".join(dict.fromkeys(row.quantity for row in _rows_of(report, quantity)))
-    axes.set_ylabel(f"{words}\n(share of limit)")
+    label = " / ".join(dict.fromkeys(row.quantity for row in _rows_of(report, quantity)))
+    axes.set_ylabel(f"{label}\n(share of limit)")
     name = shown_name(worst.joint)
     size = "infinite" if worst.infinite else f"{worst.value:.5g} {unit_label(worst.unit, 0)}"
     note = f"worst: {name}, {size} (limit {worst.limit:.5g})"
@@ -123,8 +123,8 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
 
 def _rows_of(report: LimitReport, quantity: int) -> list[LimitRow]:
     """Return the rows of a quantity with a limit."""
-    words = {FIELDS[quantity].replace("effort", kind).replace("_", " ") for kind in ("torque", "force")}
-    return [row for row in report.limited if row.quantity in words]
+    names = {FIELDS[quantity].replace("effort", kind).replace("_", " ") for kind in ("torque", "force")}
+    return [row for row in report.limited if row.quantity in names]
 
 
 def _is_upper(report: LimitReport, row: LimitRow) -> bool:
@@ -132,8 +132,8 @@ def _is_upper(report: LimitReport, row: LimitRow) -> bool:
     if row.quantity != "position":
         return (row.limit or 0.0) > 0
     joint = report.joint_names.index(row.joint)
-    nearest = int(np.argmin(np.abs(report.times - row.time)))
-    return bool(report.shares[nearest, 0, joint] >= 0)
+    index = int(np.argmin(np.abs(report.times - row.time)))
+    return bool(report.shares[index, 0, joint] >= 0)
 
 
 def _draw_legend(report: LimitReport, joints: list[int], figure: Any) -> None:

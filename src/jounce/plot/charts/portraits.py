@@ -122,8 +122,8 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
         figure = blank_figure(SIDE * count + 0.5 * (count == 1), SIDE, _title(motion, output, pair))
         for k, axes in enumerate(figure.subplots(1, count, squeeze=False)[0]):
             component, scaled, dense = its_output.labels[k] if count > 1 else "", [], []
-            named = ((axes.set_xlabel, axes.set_xlim), (axes.set_ylabel, axes.set_ylim))
-            for (label, limits), order, values, curve in zip(named, pair, (first, second), curves, strict=True):
+            axis_setters = ((axes.set_xlabel, axes.set_xlim), (axes.set_ylabel, axes.set_ylim))
+            for (label, limits), order, values, curve in zip(axis_setters, pair, (first, second), curves, strict=True):
                 exponent = scale_of(values)
                 scaled.append(values[:, k] * 10.0**-exponent)
                 dense.append(curve[:, k] * 10.0**-exponent)
@@ -161,28 +161,28 @@ def _values(motion: Motion, output: str, orders: tuple[int, ...]) -> tuple[list[
 
 def _curve(time: Line, jets: Float[np.ndarray, "time levels"], order: int) -> Line:
     """Return a derivative at and between instants, linear where the polynomials leave the range of the values."""
-    known, values = jets[np.isfinite(jets).all(axis=1), order], jets[:, order]
+    finite, values = jets[np.isfinite(jets).all(axis=1), order], jets[:, order]
     steps = -(-SMOOTH // max(len(time) - 1, 1))
-    if steps == 1 or len(known) < 2:
+    if steps == 1 or len(finite) < 2:
         return values
     if time[-1] < time[0]:
         return _curve(time[::-1], jets[::-1], order)[::-1]
     powers = hermite_pieces(time, jets)[order:, :-1]
     factors = np.array([math.perm(k + order, order) for k in range(len(powers))], float)
-    share = np.arange(steps) / steps
+    fractions = np.arange(steps) / steps
     smooth = np.polynomial.polynomial.polyval(
-        share * np.diff(time)[:, None], (powers * factors[:, None])[:, :, None], tensor=False
+        fractions * np.diff(time)[:, None], (powers * factors[:, None])[:, :, None], tensor=False
     )
-    straight = values[:-1, None] + share * np.diff(values)[:, None]
-    slack = LEAVING * np.ptp(known)
-    stays_near = ((smooth >= known.min() - slack) & (smooth <= known.max() + slack)).all(axis=1, keepdims=True)
+    straight = values[:-1, None] + fractions * np.diff(values)[:, None]
+    slack = LEAVING * np.ptp(finite)
+    stays_near = ((smooth >= finite.min() - slack) & (smooth <= finite.max() + slack)).all(axis=1, keepdims=True)
     return np.append(np.where(stays_near, smooth, straight), values[-1])
 
 
 def _title(motion: Motion, output: str, orders: tuple[int, ...]) -> str:
-    words = [quantity_word(motion.mechanism.outputs[output], order) for order in orders]
-    what = f"hodograph of the {words[0]}" if len(words) == 1 else f"{words[1]} against {words[0]}"
-    return f"{what[0].upper()}{what[1:]} of {output}"
+    names = [quantity_word(motion.mechanism.outputs[output], order) for order in orders]
+    noun = f"hodograph of the {names[0]}" if len(names) == 1 else f"{names[1]} against {names[0]}"
+    return f"{noun[0].upper()}{noun[1:]} of {output}"
 
 
 def _mark_start(axes: Any, x: Float[np.ndarray, " time"], y: Float[np.ndarray, " time"]) -> None:
@@ -195,11 +195,11 @@ def _mark_start(axes: Any, x: Float[np.ndarray, " time"], y: Float[np.ndarray, "
     if not np.isfinite(steps).any() or np.nansum(steps) == 0:
         return
     distance = np.cumsum(np.nan_to_num(steps))
-    at = min(int(np.searchsorted(distance, 0.12 * distance[-1])) + 1, len(x) - 1)
-    begin = max(at - 1, 0)
-    if np.isfinite([x[begin], y[begin], x[at], y[at]]).all():
-        look = {"arrowstyle": "-|>", "color": GRAY, "mutation_scale": 11, "linewidth": 0}
-        axes.annotate("", (x[at], y[at]), (x[begin], y[begin]), arrowprops=look, zorder=5)
+    end = min(int(np.searchsorted(distance, 0.12 * distance[-1])) + 1, len(x) - 1)
+    begin = max(end - 1, 0)
+    if np.isfinite([x[begin], y[begin], x[end], y[end]]).all():
+        arrow_style = {"arrowstyle": "-|>", "color": GRAY, "mutation_scale": 11, "linewidth": 0}
+        axes.annotate("", (x[end], y[end]), (x[begin], y[begin]), arrowprops=arrow_style, zorder=5)
 
 
 def _few_ticks(axes: Any) -> None:

@@ -44,7 +44,7 @@ def draw_retiming(retimed: RetimedTrajectory, title: str = "") -> Figure:
         return _rate_figure(retimed, title or retimed.report.robot)
     chosen = sorted(bound[np.argsort(-price[bound])][:MOST].tolist())
     names = [str(x) for x in active["limit"].values]
-    words = list(dict.fromkeys(_quantity(name) for name in names))
+    quantities = list(dict.fromkeys(_quantity(name) for name in names))
     times = active["time"].values * retimed.stop / active["time"].values[-1]
     edges = np.concatenate([times[:1], (times[1:] + times[:-1]) / 2, times[-1:]])
     with style():
@@ -52,7 +52,7 @@ def draw_retiming(retimed: RetimedTrajectory, title: str = "") -> Figure:
         rate, bars = figure.subplots(2, 1, sharex=True, height_ratios=[RATE, BAR * len(chosen) + 0.3])
         _draw_rate(retimed, rate)
         for row, k in enumerate(chosen):
-            color = LINE_COLORS[words.index(_quantity(names[k])) % len(LINE_COLORS)]
+            color = LINE_COLORS[quantities.index(_quantity(names[k])) % len(LINE_COLORS)]
             for first, last in _runs(binds[:, k]):
                 duration = max(edges[last + 1] - edges[first], 0.002 * retimed.stop)
                 bars.broken_barh([(edges[first], duration)], (row - 0.36, 0.72), facecolors=color)

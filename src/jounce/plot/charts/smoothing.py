@@ -46,12 +46,12 @@ def draw_smoothing(given: JointTrajectory, motion: SmoothedTrajectory, title: st
         jerks = motion.derivatives(times, 3)[:, 3]
         for k, name in enumerate(names):
             rounds, index = divmod(k, len(LINE_COLORS))
-            own: dict[str, Any] = {"color": LINE_COLORS[index], "linestyle": DASHES[rounds % len(DASHES)]}
+            line: dict[str, Any] = {"color": LINE_COLORS[index], "linestyle": DASHES[rounds % len(DASHES)]}
             at, values = _samples(given, name)
             positions = motion.derivatives(at, 0)[:, 0, motion.names.index(name)]
-            distance_axes.plot(at, (values - positions) / motion.deviation, ".", markersize=1.2, color=own["color"])
+            distance_axes.plot(at, (values - positions) / motion.deviation, ".", markersize=1.2, color=line["color"])
             label = shown_name(name) if k < NAMED else None
-            jerk.plot(times, jerks[:, motion.names.index(name)], label=label, linewidth=0.9, **own)
+            jerk.plot(times, jerks[:, motion.names.index(name)], label=label, linewidth=0.9, **line)
         for side in (-1, 1):
             distance_axes.axhline(side, color=GRAY, linewidth=1.0)
         for axes in (distance_axes, jerk):
@@ -67,16 +67,16 @@ def draw_smoothing(given: JointTrajectory, motion: SmoothedTrajectory, title: st
 
 
 def _samples(given: JointTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
-    own = samples_of(given, name)
-    assert own is not None
-    chosen = evenly_chosen(np.arange(len(own[0])), DRAWN)
-    return own[0][chosen], own[1][chosen]
+    samples = samples_of(given, name)
+    assert samples is not None
+    chosen = evenly_chosen(np.arange(len(samples[0])), DRAWN)
+    return samples[0][chosen], samples[1][chosen]
 
 
 def _common_dwells(motion: SmoothedTrajectory) -> list[tuple[float, float]]:
     """Return the intervals in which all joints rest."""
     common = [(motion.start, motion.stop)]
-    for own in motion.joints.values():
-        both = [(max(a, c), min(b, d)) for a, b in common for c, d in own.dwells]
-        common = [(first, last) for first, last in both if first < last]
+    for joint in motion.joints.values():
+        overlaps = [(max(a, c), min(b, d)) for a, b in common for c, d in joint.dwells]
+        common = [(first, last) for first, last in overlaps if first < last]
     return common

@@ -44,12 +44,12 @@ def cam_disc(mechanism: Mechanism, joint: Any) -> tuple[tuple[str, str], tuple[P
         return None
     follower, leader = joint.follower, joint.leader
     turns, rocks = (getattr(part, "coordinate", None) == "angle" for part in (leader, follower))
-    disc, moved = leader.bodies[-1], follower.bodies[-1]
-    if not turns or rocks or GROUND in (disc, moved) or disc == moved:
+    disc, follower_body = leader.bodies[-1], follower.bodies[-1]
+    if not turns or rocks or GROUND in (disc, follower_body) or disc == follower_body:
         return None
     point = getattr(follower, "point_j", None)
     place = np.zeros(2) if point is None else np.asarray(resolve(point, mechanism.parameter_values), float)
-    return (disc, moved), (np.zeros(2), place)
+    return (disc, follower_body), (np.zeros(2), place)
 
 
 def pitch_curve(

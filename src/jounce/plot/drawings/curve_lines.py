@@ -56,23 +56,23 @@ def _net(curve: CurveLaw, ends: list[float]) -> tuple[Float[np.ndarray, "place c
     """Return the lines of a surface along both parameters."""
     (first, last), (low, high) = ends[:2], ends[2:]
     u, v = np.linspace(first, last, SAMPLES // 8), np.linspace(low, high, SAMPLES // 8)
-    across = [(np.full(len(v), x), v) for x in np.linspace(first, last, ACROSS)]
-    along = [(u, np.full(len(u), x)) for x in np.linspace(low, high, ACROSS)]
-    return tuple(derivatives_at(curve.components, *parameters)[0].T for parameters in (*across, *along))
+    u_lines = [(np.full(len(v), x), v) for x in np.linspace(first, last, ACROSS)]
+    v_lines = [(u, np.full(len(u), x)) for x in np.linspace(low, high, ACROSS)]
+    return tuple(derivatives_at(curve.components, *parameters)[0].T for parameters in (*u_lines, *v_lines))
 
 
-def shown(lines: CurveLines, visited: Float[np.ndarray, "time component"], least: float) -> list[Any]:
+def shown(lines: CurveLines, visited: Float[np.ndarray, "time component"], shortest: float) -> list[Any]:
     """Return the shown parts of lines: for an endless curve, those near the visited places, in the same frame."""
-    known = visited[np.isfinite(visited).all(axis=1)]
-    if lines.whole or not len(known):
+    finite = visited[np.isfinite(visited).all(axis=1)]
+    if lines.whole or not len(finite):
         return list(lines.lines)
-    low, high = known.min(axis=0), known.max(axis=0)
-    margin = max(AROUND * float(np.linalg.norm(high - low)), least)
+    low, high = finite.min(axis=0), finite.max(axis=0)
+    margin = max(AROUND * float(np.linalg.norm(high - low)), shortest)
     parts = []
     for line in lines.lines:
         inside = ((line >= low - margin) & (line <= high + margin)).all(axis=1)
-        nearest = int(np.argmin(np.linalg.norm(line - known[0], axis=1)))
-        first = last = nearest
+        index = int(np.argmin(np.linalg.norm(line - finite[0], axis=1)))
+        first = last = index
         while first > 0 and inside[first - 1]:
             first -= 1
         while last < len(line) - 1 and inside[last + 1]:

@@ -128,8 +128,8 @@ class Drawing:
     @cached_property
     def colors(self) -> dict[str, str]:
         """Color of each moving body."""
-        moving = [body for body in self.skeleton.links if body != GROUND]
-        return {body: BODY_COLORS[k % len(BODY_COLORS)] for k, body in enumerate(moving)}
+        bodies = [body for body in self.skeleton.links if body != GROUND]
+        return {body: BODY_COLORS[k % len(BODY_COLORS)] for k, body in enumerate(bodies)}
 
     @cached_property
     def unit(self) -> float:
@@ -138,9 +138,9 @@ class Drawing:
         for wheel in self.skeleton.wheels:
             center = self.flat(self.at(wheel.body, wheel.center))
             points += [center - wheel.radius, center + wheel.radius]
-        everywhere = np.concatenate(points)
-        everywhere = everywhere[np.isfinite(everywhere).all(axis=1)]
-        extent = np.linalg.norm(np.ptp(everywhere, axis=0)) if len(everywhere) else 0.0
+        all_points = np.concatenate(points)
+        all_points = all_points[np.isfinite(all_points).all(axis=1)]
+        extent = np.linalg.norm(np.ptp(all_points, axis=0)) if len(all_points) else 0.0
         return UNIT * float(extent or self.skeleton.size)
 
     def at(
@@ -151,8 +151,8 @@ class Drawing:
 
     def toward(self, body: str, vector: Point) -> Float[np.ndarray, "time components"]:
         """Return the unit vector along a vector of a body, in the global frame."""
-        turned = self.at(body, vector) - self.frames[body][:, :, 0]
-        return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+        rotated = self.at(body, vector) - self.frames[body][:, :, 0]
+        return rotated / np.linalg.norm(rotated, axis=-1, keepdims=True)
 
     def within(self, body: str, points: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
         """Return global points in the frame of a body."""
@@ -183,21 +183,21 @@ class Drawing:
         """Return the projections of the points of a symbol on its first two bodies."""
         return self.point(symbol, 0), self.point(symbol, 1)
 
-    def line(self, *points: np.ndarray, **look: Any) -> None:
+    def line(self, *points: np.ndarray, **style: Any) -> None:
         """Draw a line through points, each (time, 2) or constant, (2,)."""
-        self._add("line", self._joined(points), look)
+        self._add("line", self._joined(points), style)
 
-    def area(self, *points: np.ndarray, **look: Any) -> None:
+    def area(self, *points: np.ndarray, **style: Any) -> None:
         """Draw a closed outline."""
-        self._add("area", self._joined(points), look)
+        self._add("area", self._joined(points), style)
 
-    def curve(self, points: Curve, *, closed: bool = False, **look: Any) -> None:
+    def curve(self, points: Curve, *, closed: bool = False, **style: Any) -> None:
         """Draw a line through points."""
-        self._add("area" if closed else "line", points, look)
+        self._add("area" if closed else "line", points, style)
 
-    def disc(self, center: Flat, radius: float, **look: Any) -> None:
+    def disc(self, center: Flat, radius: float, **style: Any) -> None:
         """Draw a disc around a point."""
-        self._add("disc", center[:, None], {"radius": float(radius), **look})
+        self._add("disc", center[:, None], {"radius": float(radius), **style})
 
     def name(self, text: str, anchor: Flat, color: str) -> None:
         """Write a name near an anchor."""
@@ -211,8 +211,8 @@ class Drawing:
         count = len(self.frames[GROUND])
         return np.stack([np.broadcast_to(point, (count, 2)) for point in points], axis=1)
 
-    def _add(self, kind: str, points: Curve, look: dict[str, Any]) -> None:
-        self.shapes.append(Shape(kind, points, **{"owner": self.owner, **look}))
+    def _add(self, kind: str, points: Curve, style: dict[str, Any]) -> None:
+        self.shapes.append(Shape(kind, points, **{"owner": self.owner, **style}))
 
 
 def tinted(color: str, share: float = 0.2) -> str:

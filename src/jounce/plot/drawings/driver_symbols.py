@@ -45,14 +45,14 @@ def _sliding(drawing: Drawing, symbol: Symbol) -> None:
         _turning(drawing, symbol)
         return
     body = GROUND if symbol.kind == "coordinate" else symbol.bodies[0]
-    along = drawing.flat(drawing.toward(body, symbol.axis_on(0)))
-    u, side = drawing.unit, normal_of(unit_vector(along))
+    direction = drawing.flat(drawing.toward(body, symbol.axis_on(0)))
+    u, side = drawing.unit, normal_of(unit_vector(direction))
     point = drawing.point(symbol, 1) + 2.0 * u * side
-    drawing.line(point - 2.4 * u * along, point + 2.4 * u * along, width=1.3, layer=MARKS)
+    drawing.line(point - 2.4 * u * direction, point + 2.4 * u * direction, width=1.3, layer=MARKS)
     for sign in (-1.0, 1.0):
-        tip = point + sign * 3.4 * u * along
-        back = point + sign * 2.2 * u * along
-        drawing.area(tip, back + 0.55 * u * side, back - 0.55 * u * side, fill=INK, width=0.4, layer=MARKS)
+        tip = point + sign * 3.4 * u * direction
+        tail = point + sign * 2.2 * u * direction
+        drawing.area(tip, tail + 0.55 * u * side, tail - 0.55 * u * side, fill=INK, width=0.4, layer=MARKS)
 
 
 def _turning(drawing: Drawing, symbol: Symbol) -> None:
@@ -63,12 +63,12 @@ def _turning(drawing: Drawing, symbol: Symbol) -> None:
 def _pivot(drawing: Drawing, symbol: Symbol) -> tuple[Flat, Float[np.ndarray, "time 2 2"]]:
     """Return the point about which two bodies turn, and the projections of two vectors perpendicular to the axis."""
     hinges = [s for s in drawing.skeleton.symbols if s.kind in HINGES]
-    between = set(symbol.bodies)
-    shared = [s for s in hinges if between - {GROUND} <= set(s.bodies) and between <= {*s.bodies[:2], GROUND}]
-    shared = shared or [s for s in hinges if symbol.bodies[-1] in s.bodies]
+    pair = set(symbol.bodies)
+    common = [s for s in hinges if pair - {GROUND} <= set(s.bodies) and pair <= {*s.bodies[:2], GROUND}]
+    common = common or [s for s in hinges if symbol.bodies[-1] in s.bodies]
     body = next(body for body in reversed(symbol.bodies) if body != GROUND)
-    if shared:
-        center = drawing.point(shared[0], shared[0].bodies.index(body) if body in shared[0].bodies else None)
+    if common:
+        center = drawing.point(common[0], common[0].bodies.index(body) if body in common[0].bodies else None)
     else:
         center = drawing.flat(drawing.at(body, drawing.skeleton.links[body].points[0]))
     if drawing.planar:

@@ -49,8 +49,8 @@ def assembled(mechanism: Mechanism) -> dict[str, Frame]:
     >>> assembled(jn.load("examples/four_bar.yaml"))["crank"][0, :, 1].round(6).tolist()  # x axis
     [0.866025, 0.5]
     """
-    fixed = with_output_drivers(mechanism)
-    started = dataclasses.replace(fixed, drivers={**fixed.drivers, **fixed.initial}, initial={})
+    converted = with_output_drivers(mechanism)
+    started = dataclasses.replace(converted, drivers={**converted.drivers, **converted.initial}, initial={})
     first = first_instant(mechanism.time, mechanism.parameter_values)
     model, coordinates = assemble(build(chosen(started, first)), first, ASSEMBLY_TOLERANCE, free=True)
     return _by_body(mechanism, _frames.along((), coordinates, pose_type=model.pose_type))
@@ -76,13 +76,13 @@ def frames(motion: Motion) -> dict[str, Frame]:
     if "frames" not in motion.derived:
         pose_type, coordinates = motion.poses
         first = {name: derivatives[0] for name, derivatives in coordinates.items()}
-        whole = _frames.along((), first, pose_type=pose_type)
-        motion.derived["frames"] = np.where(np.asarray(motion.status) == 0, whole, np.nan)
+        poses = _frames.along((), first, pose_type=pose_type)
+        motion.derived["frames"] = np.where(np.asarray(motion.status) == 0, poses, np.nan)
     return _by_body(motion.mechanism, motion.derived["frames"])
 
 
-def _by_body(mechanism: Mechanism, whole: Any) -> dict[str, Frame]:
-    by_time, names = np.moveaxis(np.asarray(whole), -1, 0), (GROUND, *mechanism.rigid_bodies)
+def _by_body(mechanism: Mechanism, poses: Any) -> dict[str, Frame]:
+    by_time, names = np.moveaxis(np.asarray(poses), -1, 0), (GROUND, *mechanism.rigid_bodies)
     return {body: by_time[..., k] for k, body in enumerate(names)}
 
 
@@ -98,8 +98,8 @@ def points_at(
     frame: Frame, points: Float[np.ndarray, "*points components"]
 ) -> Float[np.ndarray, "time *points components"]:
     """Return points of a body in the global frame."""
-    turned = np.einsum("tck,...k->t...c", frame[:, :, 1:], points)
-    return turned + frame[:, :, 0].reshape(len(frame), *[1] * (points.ndim - 1), -1)
+    rotated = np.einsum("tck,...k->t...c", frame[:, :, 1:], points)
+    return rotated + frame[:, :, 0].reshape(len(frame), *[1] * (points.ndim - 1), -1)
 
 
 def within(frame: Frame, points: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:

@@ -152,17 +152,17 @@ def shaft_wheels(mechanism: Mechanism, gear: Any) -> tuple[list[Center], list[fl
         along = [np.linalg.det(np.stack([offset, axis, normal])) / sine**2 for axis in axes[::-1]]
         centers = [point + t * axis for point, t, axis in zip(points, along, axes, strict=True)]
     distance = float(np.linalg.norm(centers[1] - centers[0]))
-    reach = [float((point - center) @ axis) for point, center, axis in zip(points, centers, axes, strict=True)]
+    distances = [float((point - center) @ axis) for point, center, axis in zip(points, centers, axes, strict=True)]
     size = max(1e-300, *(float(np.max(np.abs(point))) for point in points))
     if distance > 1e-9 * size:
-        thick = np.maximum(np.array([ratio, 1.0]) / (1.0 + ratio), THINNEST)
-        radii = (thick / thick.sum() * distance).tolist()
+        thicknesses = np.maximum(np.array([ratio, 1.0]) / (1.0 + ratio), THINNEST)
+        radii = (thicknesses / thicknesses.sum() * distance).tolist()
     else:
-        known = [abs(reach[0]) * sine, abs(reach[1]) * sine / ratio]
+        known = [abs(distances[0]) * sine, abs(distances[1]) * sine / ratio]
         second = next((x for x in known if x > 1e-9 * size), 0.15 * size)
         radii = [ratio * second, second]
         for k, other in enumerate((second, ratio * second)):
-            side = axes[k] if reach[k] >= 0 else -axes[k]
+            side = axes[k] if distances[k] >= 0 else -axes[k]
             centers[k] = centers[k] + side * other / (sine or 1.0)
     local_centers = [within(frames[b], c[None])[0] for b, c in zip(gear.bodies, centers, strict=False)]
     return local_centers, radii

@@ -100,8 +100,8 @@ class Symbol:
     @property
     def moving_slot(self) -> int:
         """Number of the body to which the symbol is fixed: the last one that moves."""
-        moving = [k for k, body in enumerate(self.bodies[:2]) if body != GROUND]
-        return moving[-1] if moving else 0
+        slots = [k for k, body in enumerate(self.bodies[:2]) if body != GROUND]
+        return slots[-1] if slots else 0
 
     @property
     def block_and_rail(self) -> tuple[int, int]:
@@ -110,8 +110,8 @@ class Symbol:
 
     def axis_on(self, slot: int) -> Point:
         """Return the axis or direction on one of the bodies, in its frame; x if it has none."""
-        known = [axis for axis in (self.axes[slot], self.axes[1 - slot]) if axis is not None]
-        return known[0] if known else np.eye(len(self.points[slot]))[0]
+        axes = [axis for axis in (self.axes[slot], self.axes[1 - slot]) if axis is not None]
+        return axes[0] if axes else np.eye(len(self.points[slot]))[0]
 
 
 @dataclass(frozen=True)
@@ -167,9 +167,9 @@ class Skeleton:
             for body, center, radius in zip(symbol.bodies, symbol.points, symbol.radii, strict=True):
                 if radius is None or len(center) > 2:  # spatial wheels are drawn about their axes
                     continue
-                near = SAME * self.size
-                same = (w for w in wheels if w.body == body and np.allclose(w.center, center, rtol=0, atol=near))
-                if not any(abs(wheel.radius - radius) <= near for wheel in same):
+                gap = SAME * self.size
+                matches = (w for w in wheels if w.body == body and np.allclose(w.center, center, rtol=0, atol=gap))
+                if not any(abs(wheel.radius - radius) <= gap for wheel in matches):
                     partner = sum(radii) - radius if symbol.kind == "gear" else None
                     wheels.append(Wheel(body, center, radius, symbol.internal and radius == max(radii), partner))
         return wheels
@@ -182,9 +182,9 @@ class _Points:
     positions: list[np.ndarray] = field(default_factory=list)
     names: list[list[str]] = field(default_factory=list)
 
-    def add(self, point: Point, name: str, near: float) -> None:
-        for known, names in zip(self.positions, self.names, strict=True):
-            if np.linalg.norm(known - point) <= near:
+    def add(self, point: Point, name: str, gap: float) -> None:
+        for position, names in zip(self.positions, self.names, strict=True):
+            if np.linalg.norm(position - point) <= gap:
                 if name and name not in names:
                     names.append(name)
                 return
@@ -227,18 +227,18 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
         kind: {name: _values(element, parameters, components, f"{kind}.{name}") for name, element in elements.items()}
         for kind, elements in mechanism.elements.items()
     }
-    touching = [touch for kind, values in kinds.items() for touch in _element_points(mechanism.elements[kind], values)]
+    touches = [touch for kind, values in kinds.items() for touch in _element_points(mechanism.elements[kind], values)]
     start = guessed(mechanism)
-    everywhere = [points_at(start[body], local)[0] for _, body, local in touching]
+    all_points = [points_at(start[body], local)[0] for _, body, local in touches]
     curves = {name: curve_lines(mechanism, name) for name, joint in mechanism.joints.items() if joint.hidden}
     for name, curve in curves.items():
         lines = curve.lines if curve.whole else ()
-        everywhere += [point for x in lines for point in points_at(start[mechanism.joints[name].bodies[0]], x)[0]]
-    size = float(np.linalg.norm(np.ptp(everywhere or [[0.0]], axis=0)))
+        all_points += [point for x in lines for point in points_at(start[mechanism.joints[name].bodies[0]], x)[0]]
+    size = float(np.linalg.norm(np.ptp(all_points or [[0.0]], axis=0)))
     if not size:
-        size = 2 * _largest([local for _, _, local in touching], mechanism, kinds) or 1.0
+        size = 2 * _largest([local for _, _, local in touches], mechanism, kinds) or 1.0
     bodies = {body: _Points() for body in start}
-    for name, body, local in touching:
+    for name, body, local in touches:
         bodies[body].add(local, name, SAME * size)
     holding = {*mechanism.joints, *mechanism.drivers, *mechanism.forces}
     links = {}
@@ -289,14 +289,14 @@ def _element_points(elements: Mapping[str, Any], values: Mapping[str, Values]) -
                 yield name, element.bodies[_slot(field_name)], value
 
 
-def _complete(body: str, points: _Points, mechanism: Mechanism, components: int, near: float) -> None:
+def _complete(body: str, points: _Points, mechanism: Mechanism, components: int, gap: float) -> None:
     """Add the center of mass, or the origin, to a body with too few points to be visible."""
     if body != GROUND and len(points.positions) < 2:
         center = mechanism.bodies[body].center_of_mass
         if center is not None:
-            points.add(np.asarray(resolve(center, mechanism.parameter_values), float), "", near)
+            points.add(np.asarray(resolve(center, mechanism.parameter_values), float), "", gap)
     if not points.positions:
-        points.add(np.zeros(components), "", near)
+        points.add(np.zeros(components), "", gap)
 
 
 def _largest(points: list[Point], mechanism: Mechanism, kinds: Mapping[str, Mapping[str, Values]]) -> float:
@@ -311,7 +311,7 @@ def _largest(points: list[Point], mechanism: Mechanism, kinds: Mapping[str, Mapp
     return max(lengths, default=0.0)
 
 
-def _bars(points: Points, near: float, is_held: list[bool]) -> tuple[tuple[int, int], ...]:
+def _bars(points: Points, gap: float, is_held: list[bool]) -> tuple[tuple[int, int], ...]:
     """Return the bars of a link: one between two points, the outline of points in a plane, or else a tree."""
     count = len(points)
     if count < 2:
@@ -320,22 +320,22 @@ def _bars(points: Points, near: float, is_held: list[bool]) -> tuple[tuple[int, 
         return ((0, 1),)
     centered = points - points.mean(axis=0)
     _, sizes, directions = np.linalg.svd(centered, full_matrices=False)
-    if sizes[1] <= near:  # all on one line
+    if sizes[1] <= gap:  # all on one line
         order = np.argsort(centered @ directions[0]).tolist()
         return tuple(pairwise(order))
-    if points.shape[1] == 2 or sizes[2] <= near:  # a plate
+    if points.shape[1] == 2 or sizes[2] <= gap:  # a plate
         from scipy.spatial import ConvexHull
 
-        around = ConvexHull(centered @ directions[:2].T).vertices.tolist()
-        return tuple(pairwise([*around, around[0]]))
+        hull = ConvexHull(centered @ directions[:2].T).vertices.tolist()
+        return tuple(pairwise([*hull, hull[0]]))
     corners = np.flatnonzero(is_held)
     if 3 <= len(corners) < count:
-        inner = _bars(points[corners], near, [True] * len(corners))
+        inner = _bars(points[corners], gap, [True] * len(corners))
         if len(inner) >= 3 and inner[-1][1] == inner[0][0]:  # a plate, with bars to points of outputs
             ring = tuple((int(corners[i]), int(corners[j])) for i, j in inner)
-            others = (k for k in range(count) if not is_held[k])
+            free_points = (k for k in range(count) if not is_held[k])
             distance = np.linalg.norm(points[:, None] - points[None, corners], axis=-1)
-            return (*ring, *((k, int(corners[np.argmin(distance[k])])) for k in others))
+            return (*ring, *((k, int(corners[np.argmin(distance[k])])) for k in free_points))
     from scipy.sparse.csgraph import minimum_spanning_tree
 
     tree = minimum_spanning_tree(np.linalg.norm(points[:, None] - points[None], axis=-1)).tocoo()

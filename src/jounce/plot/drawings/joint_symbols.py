@@ -24,24 +24,24 @@ from jounce.plot.style import GRAY
 
 def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
     """Draw all joints, drivers and forces of a mechanism, with the names of joints."""
-    seen = drawing.skeleton
-    for wheel in seen.wheels:
+    skeleton = drawing.skeleton
+    for wheel in skeleton.wheels:
         _draw_wheel(drawing, wheel)
-    for symbol in seen.symbols:
+    for symbol in skeleton.symbols:
         drawing.owner = f"joints.{symbol.name}"
         (_PLANAR if drawing.planar else _SPATIAL).get(symbol.kind, _unknown)(drawing, symbol)
         if symbol.kind not in _UNNAMED:
             center = np.mean(drawing.ends(symbol), axis=0) if symbol.kind in _BETWEEN else drawing.point(symbol)
             drawing.name(symbol.name, center, INK)
-    for kind, symbols in (("drivers", seen.drivers), ("forces", seen.forces)):
+    for kind, symbols in (("drivers", skeleton.drivers), ("forces", skeleton.forces)):
         for symbol in symbols:
             drawing.owner = f"{kind}.{symbol.name}"
             DRIVERS_AND_FORCES.get(symbol.kind, _unknown)(drawing, symbol)
     for name, output in mechanism.outputs.items():
         bodies = getattr(output, "bodies", ())
-        elsewhere = isinstance(output, SymmetricRollCenterOutput)  # its point is the contact point
-        if getattr(output, "point", None) is not None and len(bodies) == 1 and not elsewhere:
-            link = seen.links[bodies[0]]
+        is_contact = isinstance(output, SymmetricRollCenterOutput)  # its point is the contact point
+        if getattr(output, "point", None) is not None and len(bodies) == 1 and not is_contact:
+            link = skeleton.links[bodies[0]]
             for center in (point for point, names in zip(link.points, link.names, strict=True) if name in names):
                 drawing.owner, flat = f"outputs.{name}", drawing.flat(drawing.at(link.body, center))
                 drawing.disc(flat, 0.3 * drawing.unit, stroke="", fill=INK, layer=MARKS)
@@ -51,8 +51,8 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
 
 def _says(label: Label, name: str, body: str, place: Flat, unit: float) -> bool:
     """Return whether an output has the name of its body, or of a joint at its position, which is already written."""
-    near = np.linalg.norm(label.anchor - place, axis=1) < 3.0 * unit
-    return label.text == name and (label.owner == f"bodies.{body}" or bool(near.all()))
+    is_near = np.linalg.norm(label.anchor - place, axis=1) < 3.0 * unit
+    return label.text == name and (label.owner == f"bodies.{body}" or bool(is_near.all()))
 
 
 def _draw_wheel(drawing: Drawing, wheel: Wheel) -> None:
@@ -64,10 +64,10 @@ def _draw_wheel(drawing: Drawing, wheel: Wheel) -> None:
         drawing.disc(center, radius + rim, width=1.2, **look)
     drawing.disc(center, radius, fill="" if wheel.internal else tinted(color, 0.15), width=1.6, **look)
     if not drawing.skeleton.links[body].edges:  # its name is in the wheel, or at its rim
-        above = np.array([0.0, radius if wheel.internal else 0.55 * radius])
-        drawing.move_name(f"bodies.{body}", center + above)
-    marked = (radius + rim, radius) if wheel.internal else (0.0, radius)
-    far, out = (drawing.flat(drawing.at(body, wheel.center + np.array([reach, 0.0]))) for reach in marked)
+        offset = np.array([0.0, radius if wheel.internal else 0.55 * radius])
+        drawing.move_name(f"bodies.{body}", center + offset)
+    ends = (radius + rim, radius) if wheel.internal else (0.0, radius)
+    far, out = (drawing.flat(drawing.at(body, wheel.center + np.array([reach, 0.0]))) for reach in ends)
     drawing.line(far, out, width=1.2, **look)
 
 
@@ -195,8 +195,8 @@ def _hinge(drawing: Drawing, symbol: Symbol) -> None:
     parts.draw_ground_support(drawing, symbol)
     slot = symbol.moving_slot
     axes = drawing.frame_along(symbol.bodies[slot], symbol.axis_on(slot))
-    point, reach = drawing.point(symbol, slot), 3.2 * drawing.unit * drawing.flat(axes[:, 0])
-    drawing.line(point - reach, point + reach, width=0.7, dashes=parts.DASH_DOT, layer=SYMBOLS)
+    point, arm = drawing.point(symbol, slot), 3.2 * drawing.unit * drawing.flat(axes[:, 0])
+    drawing.line(point - arm, point + arm, width=0.7, dashes=parts.DASH_DOT, layer=SYMBOLS)
     parts.cylinder(drawing, point, axes, (1.5, 0.75), fill=parts.PAPER, width=1.1, layer=SYMBOLS)
 
 

@@ -92,23 +92,23 @@ def place_names(
     distances = np.repeat(DISTANCES, DIRECTIONS)
     for number, half in enumerate(halves):
         offsets = _offsets(directions, distances, half, unit)
-        known = [k for k in range(len(instants)) if np.isfinite(anchors[number, k]).all()]
-        if not known:
+        finite = [k for k in range(len(instants)) if np.isfinite(anchors[number, k]).all()]
+        if not finite:
             placements.append(None)
             continue
         cost = COST_OF_DISTANCE * distances
-        for k in known:
-            own, others = anchors[number, k], np.delete(anchors[:, k], number, axis=0)
-            cost = cost + _costs(own, offsets, half, *drawn[k], boxes[k], others, frame) / len(known)
+        for k in finite:
+            anchor, others = anchors[number, k], np.delete(anchors[:, k], number, axis=0)
+            cost = cost + _costs(anchor, offsets, half, *drawn[k], boxes[k], others, frame) / len(finite)
         best = int(np.argmin(cost))
-        strange = False
-        for k in known:
-            own, center = anchors[number, k], anchors[number, k] + offsets[best]
+        doubtful = False
+        for k in finite:
+            anchor, center = anchors[number, k], anchors[number, k] + offsets[best]
             box = np.concatenate([center - half, center + half])
             boxes[k] = np.vstack([boxes[k], box])
-            strange = strange or bool(_is_nearer_to_others(box[None, :2], box[None, 2:], own, anchors[:, k])[0])
+            doubtful = doubtful or bool(_is_nearer_to_others(box[None, :2], box[None, 2:], anchor, anchors[:, k])[0])
         direction, distance = (float(directions[best, 0]), float(directions[best, 1])), float(distances[best])
-        placements.append(NamePlace(direction, distance, distance > LEADER or strange))
+        placements.append(NamePlace(direction, distance, distance > LEADER or doubtful))
     return placements
 
 
@@ -146,7 +146,7 @@ def _drawn(
 
 
 def _costs(
-    own: Pixels,
+    anchor: Pixels,
     offsets: Float[np.ndarray, "candidate 2"],
     half: Pixels,
     drawn: Points,
@@ -157,24 +157,24 @@ def _costs(
 ) -> Float[np.ndarray, " candidate"]:
     """Return the costs of the candidate places of a name at one instant, without those of distance."""
     reach = np.abs(offsets).max(axis=0) + half + 2.0
-    near = (np.abs(drawn - own) < reach).all(axis=1)
-    low, high = own + offsets - half, own + offsets + half
-    taken = drawn[near]
-    inside = ((taken > low[:, None] - 1.5) & (taken < high[:, None] + 1.5)).all(axis=2)
+    is_near = (np.abs(drawn - anchor) < reach).all(axis=1)
+    low, high = anchor + offsets - half, anchor + offsets + half
+    points = drawn[is_near]
+    inside = ((points > low[:, None] - 1.5) & (points < high[:, None] + 1.5)).all(axis=2)
     overlap = np.minimum(high[:, None], boxes[:, 2:]) - np.maximum(low[:, None], boxes[:, :2])
     clash = np.maximum(0.0, overlap).prod(axis=2).sum(axis=1)
     outside = (np.maximum(0.0, frame[:2] - low) + np.maximum(0.0, high - frame[2:])).sum(axis=1)
-    covered = inside @ weights[near]
-    strange = COST_OF_STRANGER * _is_nearer_to_others(low, high, own, others)
-    return covered + COST_OF_OVERLAP * clash + COST_OF_EDGE * outside + strange
+    covered = inside @ weights[is_near]
+    ambiguity = COST_OF_STRANGER * _is_nearer_to_others(low, high, anchor, others)
+    return covered + COST_OF_OVERLAP * clash + COST_OF_EDGE * outside + ambiguity
 
 
 def _is_nearer_to_others(
-    low: np.ndarray, high: np.ndarray, own: Pixels, anchors: Points
+    low: np.ndarray, high: np.ndarray, anchor: Pixels, anchors: Points
 ) -> Bool[np.ndarray, " candidate"]:
     """Return the mask of boxes nearer to another anchor than to their own, whose names would be ambiguous."""
-    strangers = anchors[np.linalg.norm(anchors - own, axis=1) > 2.0]  # a joint and its body may share an anchor
-    return np.any(_gap(low, high, strangers) <= _gap(low, high, own[None]) + 1.0, axis=1)
+    others = anchors[np.linalg.norm(anchors - anchor, axis=1) > 2.0]  # a joint and its body may share an anchor
+    return np.any(_gap(low, high, others) <= _gap(low, high, anchor[None]) + 1.0, axis=1)
 
 
 def _gap(low: np.ndarray, high: np.ndarray, points: Points) -> Float[np.ndarray, "candidate points"]:

@@ -23,8 +23,8 @@ LARGE = 3.0  # units: larger circles need more points than a pin to look round
 def unit_vector(vectors: Flat) -> Flat:
     """Return plane vectors of unit length; vectors toward the viewer are drawn to the right."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    small = length < 1e-9
-    return np.where(small, np.array([1.0, 0.0]), vectors / np.where(small, 1.0, length))
+    is_short = length < 1e-9
+    return np.where(is_short, np.array([1.0, 0.0]), vectors / np.where(is_short, 1.0, length))
 
 
 def normal_of(vectors: Flat) -> Flat:
@@ -36,10 +36,10 @@ def _hatching(drawing: Drawing, start: Flat, stop: Flat, side: np.ndarray, count
     """Draw the ground as a line with hatching on one side."""
     u = drawing.unit
     drawing.line(start, stop, width=1.3, layer=GUIDES)
-    along = unit_vector(stop - start)
+    direction = unit_vector(stop - start)
     for k in range(count):
         foot = start + (stop - start) * ((k + 0.7) / count)
-        drawing.line(foot, foot + side * 0.75 * u - along * 0.55 * u, width=0.8, layer=GUIDES)
+        drawing.line(foot, foot + side * 0.75 * u - direction * 0.55 * u, width=0.8, layer=GUIDES)
 
 
 def draw_ground_support(drawing: Drawing, symbol: Symbol) -> None:
@@ -47,13 +47,13 @@ def draw_ground_support(drawing: Drawing, symbol: Symbol) -> None:
     if GROUND not in symbol.bodies[:2]:
         return
     u, point = drawing.unit, drawing.point(symbol, symbol.bodies.index(GROUND))
-    if any(np.allclose(known, point, rtol=0, atol=0.1 * u, equal_nan=True) for known in drawing.supports):
+    if any(np.allclose(support, point, rtol=0, atol=0.1 * u, equal_nan=True) for support in drawing.supports):
         return
     drawing.supports.append(point)
     left, right = (point + np.array([sign * 1.1, -2.0]) * u for sign in (-1, 1))
     drawing.area(point, left, right, fill=PAPER, width=1.1, layer=GUIDES)
-    wide = np.array([0.7 * u, 0.0])
-    _hatching(drawing, left - wide, right + wide, DOWN, 6)
+    half_width = np.array([0.7 * u, 0.0])
+    _hatching(drawing, left - half_width, right + half_width, DOWN, 6)
 
 
 def pin(drawing: Drawing, point: Flat) -> None:
@@ -112,11 +112,11 @@ def rail(
 def spring(drawing: Drawing, first: Flat, second: Flat, *, turns: int = 6) -> None:
     """Draw a zigzag spring between two points."""
     u = drawing.unit
-    share = np.concatenate([[0.0], np.linspace(0.14, 0.86, 2 * turns + 1), [1.0]])
-    offset = np.zeros(len(share))
-    offset[2:-2] = 0.8 * np.where(np.arange(len(share) - 4) % 2 == 0, 1.0, -1.0)
+    fractions = np.concatenate([[0.0], np.linspace(0.14, 0.86, 2 * turns + 1), [1.0]])
+    offset = np.zeros(len(fractions))
+    offset[2:-2] = 0.8 * np.where(np.arange(len(fractions) - 4) % 2 == 0, 1.0, -1.0)
     side = normal_of(unit_vector(second - first))
-    points = first[:, None] + share[:, None] * (second - first)[:, None] + (offset * u)[:, None] * side[:, None]
+    points = first[:, None] + fractions[:, None] * (second - first)[:, None] + (offset * u)[:, None] * side[:, None]
     drawing.curve(points, width=1.1, layer=SYMBOLS)
 
 
@@ -151,8 +151,8 @@ def turn(drawing: Drawing, center: Flat, plane: Float[np.ndarray, "time 2 2"], *
     angle = np.linspace(0.0, 5.0 * np.pi, 61) if spiral else np.radians(np.linspace(-50.0, 195.0, 25))
     radius = np.linspace(0.9, 2.3, len(angle)) if spiral else np.full(len(angle), 2.4)
 
-    def point_at(at: Any, distance: Any) -> np.ndarray:
-        circle = np.stack([distance * np.cos(at), distance * np.sin(at)], axis=-1) * u
+    def point_at(fraction: Any, distance: Any) -> np.ndarray:
+        circle = np.stack([distance * np.cos(fraction), distance * np.sin(fraction)], axis=-1) * u
         return center[:, None] + np.einsum("nk,tkc->tnc", circle, plane)
 
     drawing.curve(point_at(angle, radius), width=1.2, layer=MARKS)
@@ -162,7 +162,7 @@ def turn(drawing: Drawing, center: Flat, plane: Float[np.ndarray, "time 2 2"], *
         drawing.curve(head, closed=True, fill=INK, width=0.5, layer=MARKS)
 
 
-def cylinder(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, float], **look: Any) -> None:
+def cylinder(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, float], **style: Any) -> None:
     """Draw a cylinder around an axis in space.
 
     Parameters
@@ -190,12 +190,12 @@ def cylinder(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, floa
     count = 10 if size[1] < LARGE else 40
     cap = around(np.linspace(-0.5 * np.pi, 0.5 * np.pi, count))
     outline = np.concatenate([(center + axis)[:, None] + cap, (center - axis)[:, None] - cap], axis=1)
-    drawing.curve(outline, closed=True, **look)
-    near = center + axis * np.where(depth >= 0, 1.0, -1.0)[:, None]
-    drawing.curve(near[:, None] + around(np.linspace(0.0, 2 * np.pi, 2 * count + 1)[:-1]), closed=True, **look)
+    drawing.curve(outline, closed=True, **style)
+    face = center + axis * np.where(depth >= 0, 1.0, -1.0)[:, None]
+    drawing.curve(face[:, None] + around(np.linspace(0.0, 2 * np.pi, 2 * count + 1)[:-1]), closed=True, **style)
 
 
-def box(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, float, float], **look: Any) -> None:
+def box(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, float, float], **style: Any) -> None:
     """Draw the three sides of a box that face the viewer, in space.
 
     The arguments are those of `cylinder`; the size is half of the edges along the three axes, in units.
@@ -204,4 +204,4 @@ def box(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, float, fl
     facing = np.where(drawing.depth(axes) >= 0, 1.0, -1.0)  # time, 3
     for k in range(3):
         middle = center + facing[:, k, None] * halves[:, k]
-        drawing.area(*(middle + a * halves[:, k - 2] + b * halves[:, k - 1] for a, b in CORNERS), **look)
+        drawing.area(*(middle + a * halves[:, k - 2] + b * halves[:, k - 1] for a, b in CORNERS), **style)

@@ -125,8 +125,8 @@ def cam_words(facts: dict[str, Any], units: ShownUnits) -> str:
         lines.append("not undercut: the profile gives the follower its law")
     for part in facts["undercuts"]:
         range_words = f"from {worded(part['start'], 'rad', 'angle')} to {worded(part['stop'], 'rad', 'angle')}"
-        most = f"{worded(part['lost'], lift, 'lift')} at {worded(part['angle'], 'rad', 'angle')}"
-        lines.append(f"UNDERCUT {range_words}: the follower loses up to {most}")
+        largest = f"{worded(part['lost'], lift, 'lift')} at {worded(part['angle'], 'rad', 'angle')}"
+        lines.append(f"UNDERCUT {range_words}: the follower loses up to {largest}")
     if facts["undercut"]:
         lines.append("make the base circle larger, the roller smaller, or the law gentler")
     return "\n".join(lines)

@@ -77,7 +77,7 @@ def curve_facts(curve: Curve) -> dict[str, Any]:
     >>> facts["driver"], facts["closed"], facts["turns"]
     ('theta', True, 1)
     """
-    whole = bool(curve.turns) and not curve.turning_points
+    full_turn = bool(curve.turns) and not curve.turning_points
     driven = curve.driver is not None
     return {
         "title": curve.mechanism.title,
@@ -91,7 +91,12 @@ def curve_facts(curve: Curve) -> dict[str, Any]:
         "ends": list(curve.ends),
         "limits": [{"arc_length": x.arc_length, "value": x.value, "kind": x.kind} for x in curve.limits],
         "branches": [
-            {"start": b.start, "stop": b.stop, "low": None if whole else b.low, "high": None if whole else b.high}
+            {
+                "start": b.start,
+                "stop": b.stop,
+                "low": None if full_turn else b.low,
+                "high": None if full_turn else b.high,
+            }
             for b in curve.branches
         ],
         "change_points": [
@@ -121,7 +126,7 @@ def curve_summary(facts: Facts, file: str) -> str:
         f"{shape} curve of configurations, arc length {facts['stop'] - facts['start']:.9g}",
     ]
     if not facts["closed"]:
-        lines += [f"{which}: {why}" for which, why in zip(("start", "end"), facts["ends"], strict=True)]
+        lines += [f"{which}: {reason}" for which, reason in zip(("start", "end"), facts["ends"], strict=True)]
     if facts["driver"] is None:
         lines.append("nothing is driven: no limit positions")
     elif facts["branches"][0]["low"] is None:

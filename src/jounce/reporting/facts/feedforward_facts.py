@@ -31,9 +31,9 @@ def feedforward_words(motion: Feedforward, resting: Mapping[str, float]) -> str:
     if resting:
         lines.append(f"not in the trajectory, held still: {', '.join(resting)}")
     velocity, largest = motion.start[1, 1], np.abs(motion.position[:, 1]).max(axis=0)
-    moving = [name for name, v, most in zip(motion.names, velocity, largest, strict=True) if abs(v) > REST * most]
-    if moving:
-        lines.append(f"already moving at the start, as the trajectory does not begin at rest: {', '.join(moving)}")
+    names = [name for name, v, peak in zip(motion.names, velocity, largest, strict=True) if abs(v) > REST * peak]
+    if names:
+        lines.append(f"already moving at the start, as the trajectory does not begin at rest: {', '.join(names)}")
     return "\n".join(lines)
 
 
@@ -91,9 +91,9 @@ def link_error_words(errors: LinkErrors) -> str:
 
 
 def _largest(values: np.ndarray, errors: LinkErrors) -> str:
-    lost = ~np.isfinite(values).all(axis=1)
-    if lost.any():
-        return f"more than can be followed beyond t = {time_text(errors.time[np.argmax(lost)])} s"
+    undefined = ~np.isfinite(values).all(axis=1)
+    if undefined.any():
+        return f"more than can be followed beyond t = {time_text(errors.time[np.argmax(undefined)])} s"
     column = int(np.argmax(values.max(axis=0)))
     return f"{values[:, column].max():.2g} {errors.units[column]} ({errors.names[column]})"
 

@@ -74,29 +74,29 @@ def write_holding(dataset: xarray.Dataset, path: str | PathLike[str], *, overwri
 
 def _of_driver(name: str, array: Any, time: np.ndarray) -> dict[str, Any]:
     least, greatest = array.sel(bound="least").values, array.sel(bound="greatest").values
-    known = ~np.isnan(least) & ~np.isnan(greatest)
-    stays = (least <= 0) & (greatest >= 0)
+    defined = ~np.isnan(least) & ~np.isnan(greatest)
+    holds = (least <= 0) & (greatest >= 0)
     facts: dict[str, Any] = {"driver": name, "unit": array.attrs["units"]}
     for key, values, extreme in (("least", least, np.nanargmin), ("greatest", greatest, np.nanargmax)):
-        lane = int(extreme(values)) if known.any() else None
+        lane = int(extreme(values)) if defined.any() else None
         facts[key] = None if lane is None or not np.isfinite(values[lane]) else float(values[lane])
         facts[f"{key}_at"] = None if lane is None else float(time[lane])
-    facts["locks"] = bool(np.isinf(least[known]).any() or np.isinf(greatest[known]).any())
-    every, some = bool(known.any() and stays[known].all()), bool(stays[known].any())
-    facts["self_locking"] = every if every == some else None
+    facts["locks"] = bool(np.isinf(least[defined]).any() or np.isinf(greatest[defined]).any())
+    all_hold, any_holds = bool(defined.any() and holds[defined].all()), bool(holds[defined].any())
+    facts["self_locking"] = all_hold if all_hold == any_holds else None
     return facts | {"remark": array.attrs.get("comment", "")}
 
 
 def holding_table(facts: list[dict[str, Any]], units: ShownUnits) -> Table:
     """Return the table of forces that hold a mechanism at rest, one row for each driver, in the shown units."""
     rows = []
-    for each in facts:
-        unit, factor = units.of(each["unit"], each["driver"])
+    for fact in facts:
+        unit, factor = units.of(fact["unit"], fact["driver"])
         bounds = [
-            [_number(each, key, factor), "" if each[f"{key}_at"] is None else time_text(each[f"{key}_at"], 5)]
+            [_number(fact, key, factor), "" if fact[f"{key}_at"] is None else time_text(fact[f"{key}_at"], 5)]
             for key in ("least", "greatest")
         ]
-        rows.append([each["driver"], unit, *bounds[0], *bounds[1], STAYS[each["self_locking"]], each["remark"]])
+        rows.append([fact["driver"], unit, *bounds[0], *bounds[1], STAYS[fact["self_locking"]], fact["remark"]])
     headings = ("driver", "unit", "least", "at t/s", "greatest", "at t/s", "stays by itself", "remark")
     return table("Held at rest by", headings, rows, (2, 3, 4, 5))
 

@@ -53,15 +53,15 @@ class ModesFacts(TypedDict):
     modes: list[ModeFacts]
 
 
-def modes_facts(small: Linearization, file: str | PathLike[str], without: list[str]) -> ModesFacts:
+def modes_facts(model: Linearization, file: str | PathLike[str], without: list[str]) -> ModesFacts:
     """Return the facts of a mechanism in equilibrium or in motion, and of its modes."""
-    rest = small.equilibrium
-    modes: Any = [{**row, "eigenvalue": [row["eigenvalue"].real, row["eigenvalue"].imag]} for row in small.modes.rows]
+    rest = model.equilibrium
+    modes: Any = [{**row, "eigenvalue": [row["eigenvalue"].real, row["eigenvalue"].imag]} for row in model.modes.rows]
     return {
-        "title": small.mechanism.title,
+        "title": model.mechanism.title,
         "file": str(file),
         "equilibrium": None if rest is None else equilibrium_facts(rest, without),
-        "coordinates": list(small.coordinates),
+        "coordinates": list(model.coordinates),
         "modes": modes,
     }
 

@@ -129,8 +129,8 @@ def _remarks(motion: Motion | ChunkedMotion) -> list[str]:
         if isinstance(output, AbstractMotionOutput) and (remark := output.remark(motion, values)):
             names.setdefault(remark, []).append(name)
     for name, instants in unbounded_outputs(motion).items():
-        where = ", ".join(f"{instant:g} s" for instant in instants[:6]) + (", ..." if len(instants) > 6 else "")
-        remark = f"grows without bound toward t = {where}, its extremes say only how near an instant comes"
+        times = ", ".join(f"{instant:g} s" for instant in instants[:6]) + (", ..." if len(instants) > 6 else "")
+        remark = f"grows without bound toward t = {times}, its extremes say only how near an instant comes"
         names.setdefault(remark, []).append(name)
     for name, remark in (slack_ropes(motion) if isinstance(motion, Motion) else {}).items():
         names.setdefault(remark, []).append(name)
@@ -139,16 +139,16 @@ def _remarks(motion: Motion | ChunkedMotion) -> list[str]:
 
 
 def _simulated(motion: Simulation) -> dict[str, Any]:
-    reached = motion.status == Status.OK
-    some, energy = bool(reached.any()), motion.energy[reached]
+    is_reached = motion.status == Status.OK
+    any_reached, energy = bool(is_reached.any()), motion.energy[is_reached]
     return {
         "mobility": motion.mobility,
         "steps": motion.steps,
         "energy": {
-            "start": energy[0] if some else None,
-            "largest_change": np.max(np.abs(energy - energy[0])) if some else None,
-            "largest_kinetic": np.max(motion.kinetic_energy[reached]) if some else None,
+            "start": energy[0] if any_reached else None,
+            "largest_change": np.max(np.abs(energy - energy[0])) if any_reached else None,
+            "largest_kinetic": np.max(motion.kinetic_energy[is_reached]) if any_reached else None,
         },
-        "drift": np.max(motion.drift[reached]) if some else None,
+        "drift": np.max(motion.drift[is_reached]) if any_reached else None,
         "kinks": [{"time": time, "name": name} for time, name in motion.kinks],
     }

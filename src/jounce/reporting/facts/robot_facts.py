@@ -190,11 +190,11 @@ def inspected_robot(robot: Robot, path: str | PathLike[str] | None = None) -> di
         borne += transmitted or 0
         closure.update(equations=transmitted, redundant=rest)
     coordinates = len(robot.joint_names)
-    left = None if message else coordinates - borne
-    words = "unknown" if left is None else freedom_words(left, ())
+    freedom = None if message else coordinates - borne
+    phrase = "unknown" if freedom is None else freedom_words(freedom, ())
     return facts | {
         "file": None if path is None else fspath(path),
-        "freedom": {"coordinates": coordinates, "equations": borne, "left": left, "words": words},
+        "freedom": {"coordinates": coordinates, "equations": borne, "left": freedom, "words": phrase},
         "assembly": {"status": "open" if message else "assembled", "message": message},
         "ok": message is None,
     }

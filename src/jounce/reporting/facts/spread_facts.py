@@ -49,22 +49,22 @@ def _facts(spread: Any, column: Column, names: Sequence[str]) -> dict[str, Any]:
 
     widest = of("std")
     widest = of("linear_std") if widest is None else widest
-    at = 0 if widest is None or np.isnan(widest).all() else int(np.nanargmax(widest))
+    index = 0 if widest is None or np.isnan(widest).all() else int(np.nanargmax(widest))
     facts: dict[str, Any] = {
         "output": f"{name}_{component}" if component else name,
         "derivative": order,
         "unit": derivative_unit(spread[name].attrs["units"], order),
-        "at": float(spread["time"].values[at]),
-        "nominal": float(chosen(spread, name, column)[at]),
+        "at": float(spread["time"].values[index]),
+        "nominal": float(chosen(spread, name, column)[index]),
     }
     for kind in ("linear_std", "std", "low", "high"):
         values = of(kind)
-        facts[kind] = None if values is None else float(values[at])
+        facts[kind] = None if values is None else float(values[index])
     for kind in ("peak", "peak_mean", "peak_std", "peak_low", "peak_high"):
         values = of(kind)
         facts[kind] = None if values is None else float(values)
     share = of("share")
-    facts["share"] = None if share is None else dict(zip(names, share[:, at].tolist(), strict=True))
+    facts["share"] = None if share is None else dict(zip(names, share[:, index].tolist(), strict=True))
     for kind in ("first_order", "total_order"):
         values = of(f"peak_{kind}")
         facts[f"peak_{kind}"] = None if values is None else dict(zip(names, values.tolist(), strict=True))

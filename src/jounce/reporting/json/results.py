@@ -56,8 +56,8 @@ def result_json(command: str, data: Mapping[str, Any]) -> str:
     """Return the JSON text of the result of a command."""
     from jounce.version import __version__
 
-    whole = {"jounce": __version__, "record": VERSION, "command": command, **plain(data)}
-    return json.dumps(whole, indent=1, allow_nan=False)
+    record = {"jounce": __version__, "record": VERSION, "command": command, **plain(data)}
+    return json.dumps(record, indent=1, allow_nan=False)
 
 
 def error_as_json(kind: str, problem: object) -> str:

@@ -59,7 +59,7 @@ def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str,
     >>> facts["of"], facts["continuous_to"], facts["derivatives"][4]["jumps"]
     ('ram_y', 3, 6)
     """
-    led, fixed, facts = output_laws(mechanism), with_output_drivers(mechanism), []
+    held_outputs, fixed, facts = output_laws(mechanism), with_output_drivers(mechanism), []
     for name, driver in fixed.drivers.items():
         motion = getattr(driver, "motion", None)
         if motion is None:
@@ -68,7 +68,7 @@ def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str,
         smoothness = continuity(law, first, last)
         facts.append({
             "driver": name,
-            "of": led[name].output if name in led else name,
+            "of": held_outputs[name].output if name in held_outputs else name,
             "unit": "rad" if is_turning(driver) else "m",
             "continuous_to": smoothness.smoothness,
             "derivatives": jump_facts(smoothness),
@@ -79,10 +79,10 @@ def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str,
 
 def _uneven_repeat(law: AbstractMotion, mechanism: Mechanism) -> str:
     """Return a remark if the period of a law is not a whole fraction or multiple of a turn of a shaft, else nothing."""
-    own, leader = law.parts if isinstance(law, FollowingMotion) and law.parts else (None, None)
-    if not isinstance(own, SplineMotion) or own.beyond != "repeat":
+    profile, leader = law.parts if isinstance(law, FollowingMotion) and law.parts else (None, None)
+    if not isinstance(profile, SplineMotion) or profile.beyond != "repeat":
         return ""
-    period = float(own.stop) - float(own.breakpoints[0])
+    period = float(profile.stop) - float(profile.breakpoints[0])
     turns = max(period, TURN) / min(period, TURN)
     if abs(turns - round(turns)) <= WHOLE * turns:
         return ""
@@ -136,15 +136,15 @@ def law_words(laws: Sequence[Mapping[str, Any]], by: str = "s", shown: tuple[str
     for law in laws:
         broken = [x for x in law["derivatives"] if x["jumps"]]
         if law["continuous_to"] is None:
-            words = f"no derivative up to the {derivative_name(10)} jumps" if not law["remark"] else "no jump is known"
+            phrase = f"no derivative up to the {derivative_name(10)} jumps" if not law["remark"] else "no jump is known"
         elif law["continuous_to"] < 0:
-            words = "not continuous"
+            phrase = "not continuous"
         else:
-            words = f"continuous to {derivative_name(law['continuous_to'])}"
+            phrase = f"continuous to {derivative_name(law['continuous_to'])}"
         for x in broken:
-            several = f" ({x['jumps']} jumps)" if x["jumps"] > 1 else ""
+            jump_count = f" ({x['jumps']} jumps)" if x["jumps"] > 1 else ""
             unit = derivative_unit(law["unit"], x["order"]) if by == "s" else f"{law['unit']}/{by}^{x['order']}"
             jump = "has no finite value" if x["largest"] is None else f"jumps by {x['largest']:.6g} {unit}"
-            words += f"; {derivative_name(x['order'])} {jump} at {x['at'] * factor:.6g} {at}{several}"
-        lines.append(f"law of {law['of']}: {words}{'; ' if law['remark'] else ''}{law['remark']}")
+            phrase += f"; {derivative_name(x['order'])} {jump} at {x['at'] * factor:.6g} {at}{jump_count}"
+        lines.append(f"law of {law['of']}: {phrase}{'; ' if law['remark'] else ''}{law['remark']}")
     return lines

@@ -35,15 +35,15 @@ def motion_summary(facts: Facts, file: str) -> str:
         if time["count"] == 1
         else f"from t = {interval_text(time['start'], time['stop'])}"
     )
-    solved = time["solved"] == time["count"]
-    instants = count(time["count"], "instant") if solved else f"{time['solved']} of {time['count']} instants"
+    all_solved = time["solved"] == time["count"]
+    instants = count(time["count"], "instant") if all_solved else f"{time['solved']} of {time['count']} instants"
     bodies = count(len(facts["bodies"]), "moving body", "moving bodies")
     joints = count(len(facts["joints"]), "joint")
     order = f"derivatives to order {facts['order']}"
     if "steps" in facts:
         head = f"{facts['space']}: {bodies}, {joints}, {count(len(facts['forces']), 'force')}"
-        taken = f"{instants} {interval} in {count(facts['steps'], 'step')}, {order}"
-        lines = [title, head, facts["mobility"], taken, *_conservation_lines(facts), *facts["remarks"]]
+        phrase = f"{instants} {interval} in {count(facts['steps'], 'step')}, {order}"
+        lines = [title, head, facts["mobility"], phrase, *_conservation_lines(facts), *facts["remarks"]]
         return "\n".join(wrapped(line) for line in lines)
     equations, drives = facts["equations_of_joints"], facts["equations_of_drivers"]
     bodies = _with_carriages(bodies, facts, facts["coordinates"])
@@ -51,17 +51,17 @@ def motion_summary(facts: Facts, file: str) -> str:
     lines = [title, f"{facts['space']}: {bodies}, {joints}", freedom_words(drives, facts["drivers"])]
     lines.append(f"{instants} {interval}, {order}")
     if facts["change_points"]:
-        passed = ", ".join(f"{t:g} s" for t in facts["change_points"][:6])
-        more = ", ..." if len(facts["change_points"]) > 6 else ""
-        lines.append(f"passes a change point, where another motion could branch off, at t = {passed}{more}")
+        change_points = ", ".join(f"{t:g} s" for t in facts["change_points"][:6])
+        ellipsis = ", ..." if len(facts["change_points"]) > 6 else ""
+        lines.append(f"passes a change point, where another motion could branch off, at t = {change_points}{ellipsis}")
     lines += [wrapped(remark) for remark in facts["remarks"]]
     return "\n".join(lines)
 
 
-def _with_carriages(words: str, facts: Facts, coordinates: int) -> str:
+def _with_carriages(phrase: str, facts: Facts, coordinates: int) -> str:
     """Return the number of bodies in words, with the number of carriages, which have hidden joint coordinates."""
     carriages = coordinates // (3 if facts["space"] == "planar" else 6) - len(facts["bodies"])
-    return f"{words} and {count(carriages, 'carriage of a joint', 'carriages of joints')}" if carriages else words
+    return f"{phrase} and {count(carriages, 'carriage of a joint', 'carriages of joints')}" if carriages else phrase
 
 
 def _conservation_lines(facts: Facts) -> list[str]:
@@ -70,8 +70,8 @@ def _conservation_lines(facts: Facts) -> list[str]:
         return []
     energy, kinks = facts["energy"], facts["kinks"]
     change, size = energy["largest_change"], energy["largest_kinetic"]
-    share = f", {change / size:.1e} of the largest kinetic energy" if size else ""
-    lines = [f"energy: {energy['start']:.9g} J at the start; it changes by {change:.2g} J{share}"]
+    fraction = f", {change / size:.1e} of the largest kinetic energy" if size else ""
+    lines = [f"energy: {energy['start']:.9g} J at the start; it changes by {change:.2g} J{fraction}"]
     if facts["drivers"] or facts["forces"]:
         lines.append("(drivers, actuators and dampers change it)")
     if kinks:
@@ -84,8 +84,8 @@ def _conservation_lines(facts: Facts) -> list[str]:
 
 def freedom_words(freedom: int, drivers: Iterable[str]) -> str:
     """Return the degrees of freedom and their drivers in words."""
-    words, names = count(freedom, "degree of freedom", "degrees of freedom"), ", ".join(drivers)
-    return f"{words}, driven by {names}" if names else words
+    phrase, names = count(freedom, "degree of freedom", "degrees of freedom"), ", ".join(drivers)
+    return f"{phrase}, driven by {names}" if names else phrase
 
 
 def start_summary(facts: Facts) -> str:
@@ -158,9 +158,9 @@ def _robot_start(facts: Facts) -> list[str]:
 
 def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:
     """Return the summary of a check of limits: the motion, joints at rest, and quantities without limits."""
-    moved = count(len(motion.names), "moving joint")
+    joint_count = count(len(motion.names), "moving joint")
     lines = [
-        f"{report.robot}: {moved} ({robot.name}, {trajectory.name})",
+        f"{report.robot}: {joint_count} ({robot.name}, {trajectory.name})",
         f"t = {interval_text(motion.start, motion.stop)}, {len(report.times)} instants and the peaks between them",
     ]
     lines += filter(None, [last_step_words(motion.times)])
@@ -252,9 +252,9 @@ def count(number: int, noun: str, plural: str = "") -> str:
 def _train_words(facts: list[dict[str, Any]]) -> list[str]:
     """Return the speed ratios of gears in words, one line for each driver."""
     by_driver: dict[str, list[str]] = {}
-    for each in facts:
-        fraction = f" = {each['fraction']}" if "/" in (each["fraction"] or "") else ""
-        by_driver.setdefault(each["driver"], []).append(f"{each['body']} {each['ratio']:.9g}{fraction}")
+    for fact in facts:
+        fraction = f" = {fact['fraction']}" if "/" in (fact["fraction"] or "") else ""
+        by_driver.setdefault(fact["driver"], []).append(f"{fact['body']} {fact['ratio']:.9g}{fraction}")
     return [f"turns for a turn of {driver}: {', '.join(fraction)}" for driver, fraction in by_driver.items()]
 
 
@@ -267,11 +267,11 @@ def efficiency_words(facts: list[dict[str, Any]]) -> list[str]:
     ['mesh: efficiency 0.42 from worm to wheel; locks itself: wheel does not drive worm']
     """
     lines_shown = []
-    for each in facts:
-        first, second = each["bodies"]
-        back = f", {each['backward']:.4g} from {second} to {first}"
-        back = back if each["backward"] > 0 else f"; locks itself: {second} does not drive {first}"
-        lines_shown.append(f"{each['joint']}: efficiency {each['forward']:.4g} from {first} to {second}{back}")
+    for fact in facts:
+        first, second = fact["bodies"]
+        backward = f", {fact['backward']:.4g} from {second} to {first}"
+        backward = backward if fact["backward"] > 0 else f"; locks itself: {second} does not drive {first}"
+        lines_shown.append(f"{fact['joint']}: efficiency {fact['forward']:.4g} from {first} to {second}{backward}")
     return lines_shown
 
 
@@ -285,11 +285,11 @@ def screw_words(facts: list[dict[str, Any]]) -> list[str]:
     ['thread: lead angle 2.865 deg, efficiency 40 % from turning to advance, locks by itself']
     """
     lines = []
-    for each in facts:
-        forth, back = (f"{100 * each[key]:.3g} %" for key in ("efficiency", "back_efficiency"))
-        backward = "locks by itself" if each["self_locking"] else f"{back} from advance to turning"
-        words = f"{each['joint']}: lead angle {math.degrees(each['lead_angle']):.4g} deg"
-        lines.append(f"{words}, efficiency {forth} from turning to advance, {backward}")
+    for fact in facts:
+        forward, back = (f"{100 * fact[key]:.3g} %" for key in ("efficiency", "back_efficiency"))
+        backward = "locks by itself" if fact["self_locking"] else f"{back} from advance to turning"
+        phrase = f"{fact['joint']}: lead angle {math.degrees(fact['lead_angle']):.4g} deg"
+        lines.append(f"{phrase}, efficiency {forward} from turning to advance, {backward}")
     return lines
 
 
@@ -302,15 +302,15 @@ def line_words(facts: list[dict[str, Any]]) -> list[str]:
     ['rope: 1.2 m long, of spans of 0.5, 0.2, 0.5 m']
     """
     lines_shown = []
-    for each in facts:
-        words = f"{each['joint']}: {each['length']:.6g} m long"
-        if each["spans"] is not None:
-            lines_shown.append(f"{words}, of spans of {', '.join(f'{span:.6g}' for span in each['spans'])} m")
+    for fact in facts:
+        phrase = f"{fact['joint']}: {fact['length']:.6g} m long"
+        if fact["spans"] is not None:
+            lines_shown.append(f"{phrase}, of spans of {', '.join(f'{span:.6g}' for span in fact['spans'])} m")
             continue
-        lies = zip(each["wraps"], each["bodies"], strict=True)
-        words += f", on {' and '.join(f'{math.degrees(wrap):.4g} deg of {body}' for wrap, body in lies)}"
+        lies = zip(fact["wraps"], fact["bodies"], strict=True)
+        phrase += f", on {' and '.join(f'{math.degrees(wrap):.4g} deg of {body}' for wrap, body in lies)}"
         parts = "the length of the belt changes as the centers move apart: a tensioner takes it up"
         lines_shown.append(
-            f"{words}; {parts}" if each["carrier"] is None else f"{words}, both carried by {each['carrier']}"
+            f"{phrase}; {parts}" if fact["carrier"] is None else f"{phrase}, both carried by {fact['carrier']}"
         )
     return lines_shown

@@ -73,11 +73,11 @@ def bodies_table(facts: Facts) -> Table:
     angle = "angle" if facts["space"] == "planar" else "quaternion"
     rows = []
     for body in facts["bodies"]:
-        pose, moved, by = body["pose"] or body["guess"], body["moved"], "-"
-        turned = [pose[angle]] if angle == "angle" else pose[angle]
-        if moved is not None:
-            by = f"{_rounded(moved['distance']):.3g} m, {_rounded(math.degrees(moved['angle'])):.3g} deg"
-        rows.append([body["name"], number(body["mass"]), vector(pose["position"]), vector(turned), by])
+        pose, offset, text = body["pose"] or body["guess"], body["moved"], "-"
+        rotation = [pose[angle]] if angle == "angle" else pose[angle]
+        if offset is not None:
+            text = f"{_rounded(offset['distance']):.3g} m, {_rounded(math.degrees(offset['angle'])):.3g} deg"
+        rows.append([body["name"], number(body["mass"]), vector(pose["position"]), vector(rotation), text])
     state_words = "assembled" if facts["assembly"]["status"] == "assembled" else "as guessed"
     title = f"Bodies, {state_words}, at t = {time_text(facts['assembly']['at'])} s"
     return table(title, ("body", "mass/kg", "position/m", "angle/rad" if angle == "angle" else angle, "moved by"), rows)
@@ -92,11 +92,11 @@ def robot_tables(facts: Facts) -> list[Table]:
             fixed.append([joint["name"], links])
             continue
         limits, mimic = joint["limits"], joint["mimic"]
-        free = limits["lower"] is None and limits["upper"] is None
-        range_words = "-" if free else f"{number(limits['lower'])} to {number(limits['upper'])} {joint['unit']}"
+        is_unlimited = limits["lower"] is None and limits["upper"] is None
+        range_words = "-" if is_unlimited else f"{number(limits['lower'])} to {number(limits['upper'])} {joint['unit']}"
         follows = _followed(mimic) if mimic else ""
-        most = [number(limits[key]) for key in ("velocity", "effort")]
-        moving.append([joint["name"], joint["type"], links, range_words, *most, follows])
+        maxima = [number(limits[key]) for key in ("velocity", "effort")]
+        moving.append([joint["name"], joint["type"], links, range_words, *maxima, follows])
     headings = ("joint", "type", "links", "range", "velocity", "effort", "follows")
     links = []
     for link in facts["links"]:
@@ -120,7 +120,7 @@ def _followed(mimic: Facts) -> str:
     leaders, multipliers = mimic["joint"], mimic["multiplier"]
     if isinstance(leaders, str):
         leaders, multipliers = [leaders], [multipliers]
-    return ", ".join(f"{name} x {by:g}" for name, by in zip(leaders, multipliers, strict=True))
+    return ", ".join(f"{name} x {multiplier:g}" for name, multiplier in zip(leaders, multipliers, strict=True))
 
 
 def other_reader_table(facts: Facts) -> Table:
@@ -132,13 +132,13 @@ def other_reader_table(facts: Facts) -> Table:
             span(joint[first], joint[several])
             for first, several in (("position", "positions"), ("velocity", "velocities"))
         ]
-        ours = ", ".join(joint["coordinates"])
+        coordinates = ", ".join(joint["coordinates"])
         if joint["factors"] is not None:
             sums = [" + ".join(f"{x:.6g} {name}" for name, x in row.items()) for row in joint["factors"]]
-            ours = "; ".join(sums).replace("+ -", "- ")
-            ours += f" + {joint['offset']:g}" if joint["offset"] else ""
+            coordinates = "; ".join(sums).replace("+ -", "- ")
+            coordinates += f" + {joint['offset']:g}" if joint["offset"] else ""
         forms = "" if single else f"{' '.join(joint['positions'])} | {' '.join(joint['velocities'])}"
-        rows.append([joint["joint"], *ranges, ours, forms, joint["note"]])
+        rows.append([joint["joint"], *ranges, coordinates, forms, joint["note"]])
     headings = ("joint", "position", "velocity", "in ours", "holds", "note")
     return table(f"As {facts['name']} {facts['version']} has it", headings, rows, (1, 2))
 

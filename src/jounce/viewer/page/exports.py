@@ -71,8 +71,8 @@ def picture(client: Any, height: int | None = None, width: int | None = None) ->
     except (TimeoutError, RuntimeError) as error:
         raise JounceError(f"the browser gave no picture: {error}") from None
     image = np.asarray(image, float)
-    share = image[..., 3:] / 255 if image.shape[-1] == 4 else 1.0
-    flat = image[..., :3] * share + 255 * (1 - share)
+    opacity = image[..., 3:] / 255 if image.shape[-1] == 4 else 1.0
+    flat = image[..., :3] * opacity + 255 * (1 - opacity)
     stream = io.BytesIO()
     imsave(stream, flat.round().astype(np.uint8), format="png")
     return stream.getvalue()

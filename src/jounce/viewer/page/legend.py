@@ -27,49 +27,49 @@ def _table(rows: list[tuple[str, ...]]) -> str:
     """Return a table as HTML, with its last column aligned to the right."""
     lines = []
     for *cells, last in rows:
-        left = "".join(f'<td style="{CELL}">{cell}</td>' for cell in cells)
-        lines.append(f'<tr>{left}<td style="{CELL};text-align:right">{last}</td></tr>')
+        cells_html = "".join(f'<td style="{CELL}">{cell}</td>' for cell in cells)
+        lines.append(f'<tr>{cells_html}<td style="{CELL};text-align:right">{last}</td></tr>')
     return f'<table style="border-collapse:collapse">{"".join(lines)}</table>' if rows else ""
 
 
-def legend(shown: Overlay, frame: int) -> str:
+def legend(overlay: Overlay, frame: int) -> str:
     """Return the legend as HTML: a row for each arrow with its current size, then scales, paths and forces."""
-    recording, rows = shown.recording, []
-    for each in shown.options.traced:
-        motion = recording.motion(each.point)[frame]
-        for order in each.orders:
+    recording, rows = overlay.recording, []
+    for trace in overlay.options.traced:
+        motion = recording.motion(trace.point)[frame]
+        for order in trace.orders:
             size = f"{_number(float(np.linalg.norm(motion[order])))} {_powers(derivative_unit('m', order))}"
-            rows.append((f"{_chip(derivative_color(order))}{derivative_name(order)}", escape(each.point.name), size))
+            rows.append((f"{_chip(derivative_color(order))}{derivative_name(order)}", escape(trace.point.name), size))
     parts = [_table(rows)]
     scales = [
         f"{_chip(derivative_color(order))}{_powers(scale_words(scale, order, recording.size))}"
-        for order, scale in shown.scales.items()
+        for order, scale in overlay.scales.items()
     ]
     if scales:
         parts.append(f'<div style="margin-top:4px;opacity:0.75">arrows: {"; ".join(scales)}</div>')
-    if any(each.path for each in shown.options.traced):
-        parts.append(_color_bar(shown))
-    parts += _loads(shown, frame)
+    if any(trace.path for trace in overlay.options.traced):
+        parts.append(_color_bar(overlay))
+    parts += _loads(overlay, frame)
     body = "".join(parts) or "nothing is marked"
     return f'<div style="font-size:0.8em;line-height:1.45;padding:2px 16px 4px 8px">{body}</div>'
 
 
-def _loads(shown: Overlay, frame: int) -> list[str]:
+def _loads(overlay: Overlay, frame: int) -> list[str]:
     """Return the rows of the shown forces and torques."""
     rows = []
-    for load in shown.loads:
-        words = []
+    for load in overlay.loads:
+        lines = []
         if load.force is not None and np.any(load.force):
-            words.append(f"{_number(float(np.linalg.norm(load.force[frame])))} N")
-        if load.torque is not None and np.abs(load.torque).max() > 1e-9 * max(shown.largest_torque, 1e-300):
-            words.append(f"{_number(float(np.linalg.norm(load.torque[frame])))} N m")
-        if words:
-            rows.append((f"{_chip(LOAD_COLORS[load.kind])}{escape(load.name)}", ", ".join(words)))
+            lines.append(f"{_number(float(np.linalg.norm(load.force[frame])))} N")
+        if load.torque is not None and np.abs(load.torque).max() > 1e-9 * max(overlay.largest_torque, 1e-300):
+            lines.append(f"{_number(float(np.linalg.norm(load.torque[frame])))} N m")
+        if lines:
+            rows.append((f"{_chip(LOAD_COLORS[load.kind])}{escape(load.name)}", ", ".join(lines)))
     if not rows:
         return []
-    kinds = ", ".join(words for kind, words in LOAD_WORDS.items() if kind in shown.options.kinds)
-    length = rounded_down(0.4 * shown.recording.size)
-    scale = f"arrows: {length:g} m is {_number(length / shown.force_scale)} N" if shown.force_scale else ""
+    kinds = ", ".join(label for kind, label in LOAD_WORDS.items() if kind in overlay.options.kinds)
+    length = rounded_down(0.4 * overlay.recording.size)
+    scale = f"arrows: {length:g} m is {_number(length / overlay.force_scale)} N" if overlay.force_scale else ""
     return [
         f'<div style="margin-top:6px"><b>{kinds}</b></div>',
         _table(rows),
@@ -77,11 +77,11 @@ def _loads(shown: Overlay, frame: int) -> list[str]:
     ]
 
 
-def _color_bar(shown: Overlay) -> str:
+def _color_bar(overlay: Overlay) -> str:
     """Return the scale of the colors of paths."""
     colors = ", ".join(f"rgb{tuple(color)}" for color in path_colors(np.linspace(0.0, 1.0, 9)).tolist())
-    low, high = shown.extremes
-    order = shown.options.path_order
+    low, high = overlay.extremes
+    order = overlay.options.path_order
     return (
         f'<div style="margin-top:6px">path: {derivative_name(order)}</div>'
         f'<div style="height:8px;border-radius:2px;background:linear-gradient(to right, {colors})"></div>'
@@ -114,13 +114,13 @@ def error_box(text: str) -> str:
 
 def status_line(recording: Recording, elapsed: float, busy: bool) -> str:
     """Return the status of the page as a gray line of HTML."""
-    words = f"{len(recording.time)} instants, order {recording.order}"
+    phrase = f"{len(recording.time)} instants, order {recording.order}"
     if busy:
-        words += ", solving ..."
+        phrase += ", solving ..."
     elif elapsed:
-        words += f", solved in {1e3 * elapsed:.0f} ms"
+        phrase += f", solved in {1e3 * elapsed:.0f} ms"
     notice = ""
     if recording.notice:
         style = "border-left:4px solid #b7791f;background:rgba(183,121,31,0.12);padding:4px 8px;margin-top:4px"
         notice = f'<div style="{style}">{escape(recording.notice)}</div>'
-    return f'<div style="font-size:0.75em;opacity:0.8;padding:2px 8px">{escape(words)}{notice}</div>'
+    return f'<div style="font-size:0.75em;opacity:0.8;padding:2px 8px">{escape(phrase)}{notice}</div>'

@@ -38,11 +38,11 @@ class DisplayOptions:
 
     def fitted(self, recording: Recording) -> DisplayOptions:
         """Return the options for another recording: points matched by name, and derivatives limited to its order."""
-        known = {point.name: point for point in recording.appearance.points}
+        points = {point.name: point for point in recording.appearance.points}
         traced = tuple(
             dataclasses.replace(
                 each,
-                point=known.get(each.point.name, each.point),
+                point=points.get(each.point.name, each.point),
                 orders=tuple(order for order in each.orders if order <= recording.order),
             )
             for each in self.traced

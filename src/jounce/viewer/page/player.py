@@ -50,13 +50,13 @@ class Player:
         0.5
         """
         duration = self.stop - self.start
-        then = self.now + elapsed * self.speed
-        if then > self.stop or then < self.start:
+        target = self.now + elapsed * self.speed
+        if target > self.stop or target < self.start:
             if self.loop and duration > 0:
-                return self.start + (then - self.start) % duration
+                return self.start + (target - self.start) % duration
             self.playing = False
-            return self.stop if then > self.stop else self.start
-        return then
+            return self.stop if target > self.stop else self.start
+        return target
 
     def _run(self) -> None:
         last = time.perf_counter()

@@ -98,18 +98,18 @@ class Chart:
     def __init__(self, gui: Any, recording: Recording, name: str, order: int):
         self.name, self.order = name, order
         title, scales = self._read(recording)
-        count, plain = self.values.shape[1], {"show": False}
+        count, unmarked = self.values.shape[1], {"show": False}
         labels = [f"{name} {c}" for c in recording.outputs[name].labels[:count]] if count > 1 else [name]
-        looks = {"width": 1.6, "points": plain}
+        looks = {"width": 1.6, "points": unmarked}
         lines = [{"label": label, "stroke": COLORS[k % 3], **looks} for k, label in enumerate(labels)]
-        now = {"label": "now", "stroke": CURSOR, "width": 1.2, "dash": (4, 3), "points": plain}
-        below = {"label": "time (s)", "labelFont": "11px sans-serif", "labelSize": 15, "size": 28, "ticks": TICKS}
+        cursor = {"label": "now", "stroke": CURSOR, "width": 1.2, "dash": (4, 3), "points": unmarked}
+        time_axis = {"label": "time (s)", "labelFont": "11px sans-serif", "labelSize": 15, "size": 28, "ticks": TICKS}
         self.handle = gui.add_uplot(
             cursor_data(self.time, self.values, 0),
-            ({"label": "time"}, *lines, now),
+            ({"label": "time"}, *lines, cursor),
             title=title,
             scales=scales,
-            axes=(below, {"size": 58, "ticks": TICKS}),
+            axes=(time_axis, {"size": 58, "ticks": TICKS}),
             legend={"show": count > 1, "live": False},
             height=180,
             padding=(6, 14, 4 if count > 1 else 0, 0),
@@ -123,9 +123,9 @@ class Chart:
         self.time, self.values = recording.time, values * 10.0**-exponent
         unit = derivative_unit(quantity.unit, self.order)
         unit = raised(f"10^{exponent} {unit}" if exponent else unit)
-        across = {"time": False, "range": (float(self.time[0]), float(self.time[-1]))}
+        scale = {"time": False, "range": (float(self.time[0]), float(self.time[-1]))}
         upward = {"auto": False, "range": axis_range(self.values, 0.06)}
-        return f"{self.name}: {quantity.words[self.order]} ({unit})", {"x": across, "y": upward}
+        return f"{self.name}: {quantity.words[self.order]} ({unit})", {"x": scale, "y": upward}
 
     def renew(self, recording: Recording) -> None:
         """Fit the axes to another motion."""

@@ -49,26 +49,26 @@ class ViserScene:
             self._set_meshes(body, meshes)
         for handle, _, _ in self._connectors:
             handle.remove()
-        self._connectors = [self._connector(recording, each) for each in recording.appearance.connectors]
+        self._connectors = [self._connector(recording, connector) for connector in recording.appearance.connectors]
 
     def _set_meshes(self, body: str, meshes: Sequence[ColoredMesh]) -> None:
-        known = self._meshes.setdefault(body, [])
-        for handle, _ in known[len(meshes) :]:
+        handles = self._meshes.setdefault(body, [])
+        for handle, _ in handles[len(meshes) :]:
             handle.remove()
-        del known[len(meshes) :]
+        del handles[len(meshes) :]
         for k, colored in enumerate(meshes):
             mesh = colored.mesh
-            if k < len(known):
-                handle, before = known[k]
+            if k < len(handles):
+                handle, before = handles[k]
                 if before.color == colored.color and np.array_equal(before.mesh.faces, mesh.faces):
                     if not np.array_equal(before.mesh.vertices, mesh.vertices):
                         handle.vertices = mesh.vertices.astype(np.float32)
-                        known[k] = (handle, colored)
+                        handles[k] = (handle, colored)
                     continue
                 handle.remove()
             opacity = None if colored.opacity >= 1 else colored.opacity
             handle = self._mesh(f"/bodies/{body}/{k}", mesh, colored.color, opacity)
-            known[k : k + 1] = [(handle, colored)]
+            handles[k : k + 1] = [(handle, colored)]
 
     def _mesh(self, name: str, mesh: Trimesh, color: Color, opacity: float | None = None) -> Any:
         vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
@@ -95,17 +95,17 @@ class ViserScene:
             handle.position = recording.position[frame, index]
             handle.wxyz = recording.quaternion[frame, index]
         for handle, start, end in self._connectors:
-            across = end[frame] - start[frame]
-            length = float(np.linalg.norm(across))
+            span = end[frame] - start[frame]
+            length = float(np.linalg.norm(span))
             handle.visible = length > 0
             if length > 0:
-                handle.position, handle.wxyz = start[frame], quaternion_to(across)
+                handle.position, handle.wxyz = start[frame], quaternion_to(span)
                 handle.scale = (1.0, 1.0, length)
-        shown = {f"derivative {k}": (arrows, derivative_color(k)) for k, arrows in overlay.arrows.items()}
-        shown |= {kind: (arrows, LOAD_COLORS[kind]) for kind, arrows in overlay.forces.items()}
-        for name in self._arrows.keys() - shown.keys() - {"paths"}:
+        arrow_sets = {f"derivative {k}": (arrows, derivative_color(k)) for k, arrows in overlay.arrows.items()}
+        arrow_sets |= {kind: (arrows, LOAD_COLORS[kind]) for kind, arrows in overlay.forces.items()}
+        for name in self._arrows.keys() - arrow_sets.keys() - {"paths"}:
             self._arrows.pop(name).remove()
-        for name, (arrows, color) in shown.items():
+        for name, (arrows, color) in arrow_sets.items():
             self._show_arrows(name, arrows[frame], color)
         self._show_torques(overlay, frame)
 
@@ -117,7 +117,7 @@ class ViserScene:
         elif name in self._arrows:
             self._arrows[name].points = arrows.astype(np.float32)
         else:
-            sizes = {key: share * self._size for key, share in ARROW.items()}
+            sizes = {key: fraction * self._size for key, fraction in ARROW.items()}
             self._arrows[name] = self.scene.add_arrows(f"/arrows/{name}", arrows, _linear(np.array(color)), **sizes)
 
     def _show_torques(self, overlay: Overlay, frame: int) -> None:
@@ -129,12 +129,12 @@ class ViserScene:
             if name not in self._arcs:
                 self._arcs[name] = self._mesh(f"/torques/{name}", arc_arrow(), LOAD_COLORS[load.kind])
             handle, torque = self._arcs[name], np.asarray(load.torque)[frame]
-            share = float(np.linalg.norm(torque)) / (overlay.largest_torque or 1.0)
-            handle.visible = share > 1e-6
+            fraction = float(np.linalg.norm(torque)) / (overlay.largest_torque or 1.0)
+            handle.visible = fraction > 1e-6
             if handle.visible:
                 handle.position = load.point[frame] + in_front(overlay.recording)
                 handle.wxyz = quaternion_to(torque)
-                handle.scale = ARC_RADIUS * self._size * (0.3 + 0.7 * np.sqrt(share))
+                handle.scale = ARC_RADIUS * self._size * (0.3 + 0.7 * np.sqrt(fraction))
 
     def begin(self, overlay: Overlay) -> None:
         """Show the paths, and set the thickness of arrows by the size of the recording."""
@@ -155,20 +155,20 @@ class ViserScene:
         self.scene.set_up_direction(recording.appearance.up)
         center = 0.5 * (low + high)
         if recording.planar:
-            half = 0.5 * MARGIN * max(high[1] - low[1], (high[0] - low[0]) / NARROW, 1e-9 * size)
-            self._set_camera(center, up, np.array([0.0, 0.0, 1.0]), half, FLAT_FIELD_OF_VIEW)
+            half_width = 0.5 * MARGIN * max(high[1] - low[1], (high[0] - low[0]) / NARROW, 1e-9 * size)
+            self._set_camera(center, up, np.array([0.0, 0.0, 1.0]), half_width, FLAT_FIELD_OF_VIEW)
             self._set_grid(2, np.array([center[0], center[1], low[2] - 0.02 * size]), size)
             return
         k = int(np.argmax(np.abs(up)))
-        toward = 0.55 * up + np.roll(up, 1) * 1.0 + np.roll(up, 2) * -0.75
-        self._set_camera(center, up, toward / np.linalg.norm(toward), 0.5 * size, FIELD_OF_VIEW)
+        viewpoint = 0.55 * up + np.roll(up, 1) * 1.0 + np.roll(up, 2) * -0.75
+        self._set_camera(center, up, viewpoint / np.linalg.norm(viewpoint), 0.5 * size, FIELD_OF_VIEW)
         center[k] = (low if up[k] > 0 else high)[k] - up[k] * 0.02 * size
         self._set_grid(k, center, size)
 
-    def _set_camera(self, target: Vector, up: Vector, toward: Vector, half: float, field: float) -> None:
-        """Point the camera at a target from a direction, with a field of view, rad, that covers twice `half`."""
-        camera, distance = self.server.initial_camera, half / np.tan(0.5 * field)
-        camera.position, camera.look_at, camera.up = tuple(target + distance * toward), tuple(target), tuple(up)
+    def _set_camera(self, target: Vector, up: Vector, viewpoint: Vector, half_width: float, field: float) -> None:
+        """Point the camera at a target from a direction, with a field of view, rad, that covers twice `half_width`."""
+        camera, distance = self.server.initial_camera, half_width / np.tan(0.5 * field)
+        camera.position, camera.look_at, camera.up = tuple(target + distance * viewpoint), tuple(target), tuple(up)
         camera.fov, camera.near, camera.far = field, 0.01 * distance, 20.0 * distance
 
     def _set_grid(self, normal: int, position: Vector, size: float) -> None:
@@ -211,6 +211,6 @@ def quaternion_to(direction: Vector) -> Float[np.ndarray, "4"]:
 
 def _linear(colors: Integer[np.ndarray, "*batch 3"]) -> UInt8[np.ndarray, "*batch 3"]:
     """Return sRGB colors as linear intensities, which the page expects for arrows and lines."""
-    share = colors / 255
-    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
-    return (255 * light).round().astype(np.uint8)
+    fraction = colors / 255
+    intensity = np.where(fraction <= 0.04045, fraction / 12.92, ((fraction + 0.055) / 1.055) ** 2.4)
+    return (255 * intensity).round().astype(np.uint8)

@@ -125,8 +125,8 @@ class Session:
             with self._news:
                 self._working = False
                 self._news.notify_all()
-                idle = not self._pending
-            if idle:
+                is_idle = not self._pending
+            if is_idle:
                 self.on_busy(False)
             with self._news:
                 self._news.wait_for(lambda: self._closed or self._pending)

@@ -68,8 +68,8 @@ class ArrowsTab(Observer):
     def _add(self) -> None:
         if self.point.value == OWN:
             own_point = tuple(float(x) for x in self.own_point.value)
-            words = ", ".join(f"{x:g}" for x in own_point)
-            self.trace(BodyPoint(self.body.value, own_point, f"{self.body.value} ({words})"))
+            coordinates = ", ".join(f"{x:g}" for x in own_point)
+            self.trace(BodyPoint(self.body.value, own_point, f"{self.body.value} ({coordinates})"))
         else:
             points = self.page.recording.appearance.points
             self.trace(next(point for point in points if point.name == self.point.value))
@@ -140,7 +140,7 @@ class ForcesTab:
                 "and drivers carry."
             )
             return
-        self.boxes = {kind: gui.add_checkbox(words, False) for kind, words in LOAD_WORDS.items()}
+        self.boxes = {kind: gui.add_checkbox(label, False) for kind, label in LOAD_WORDS.items()}
         self.length = gui.add_slider("arrow scale", 0.1, 5.0, 0.1, 1.0, hint=SCALE_HINT)
         for control in (*self.boxes.values(), self.length):
             control.on_update(lambda _: self._set())

@@ -96,22 +96,22 @@ def colored_paths(
     extremes : tuple of float
         Magnitudes of the darkest color, zero, and of the lightest color.
     """
-    motions = [recording.motion(each.point) for each in traced if each.path and len(recording.time) > 1]
+    motions = [recording.motion(trace.point) for trace in traced if trace.path and len(recording.time) > 1]
     if not motions:
         return np.zeros((0, 2, 3)), np.zeros((0, 2, 3), np.uint8), (0.0, 0.0)
     points = np.stack([motion[:, 0] for motion in motions]) + in_front(recording)
     sizes = np.linalg.norm([motion[:, order] for motion in motions], axis=-1)
-    most = float(sizes.max())
-    colors = path_colors(sizes / (most or 1.0))
+    largest = float(sizes.max())
+    colors = path_colors(sizes / (largest or 1.0))
     lines, ends = (np.stack([x[:, :-1], x[:, 1:]], axis=2).reshape(-1, 2, 3) for x in (points, colors))
-    return lines, ends, (0.0, most)
+    return lines, ends, (0.0, largest)
 
 
-def path_colors(share: Float[np.ndarray, "*batch"]) -> UInt8[np.ndarray, "*batch 3"]:
+def path_colors(fraction: Float[np.ndarray, "*batch"]) -> UInt8[np.ndarray, "*batch 3"]:
     """Return the colors of a path for fractions, from 0 to 1, of the range of a magnitude."""
     import matplotlib as mpl
 
-    return (mpl.colormaps["viridis"](0.93 * share)[..., :3] * 255).astype(np.uint8)
+    return (mpl.colormaps["viridis"](0.93 * fraction)[..., :3] * 255).astype(np.uint8)
 
 
 def scale_words(scale: float, order: int, size: float) -> str:

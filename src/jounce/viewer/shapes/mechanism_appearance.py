@@ -68,12 +68,12 @@ def _gravity(mechanism: Mechanism) -> np.ndarray:
     return np.zeros(3) if given is None else np.asarray(resolve(given, mechanism.parameter_values), float)
 
 
-def _connectors(seen: Skeleton) -> Iterator[Connector]:
+def _connectors(skeleton_: Skeleton) -> Iterator[Connector]:
     """Yield the rods, springs and actuators between two points."""
-    for symbol in (*seen.symbols, *seen.drivers, *seen.forces):
+    for symbol in (*skeleton_.symbols, *skeleton_.drivers, *skeleton_.forces):
         if symbol.kind in CONNECTORS and len(symbol.bodies) == 2:
-            kind, share, color = CONNECTORS[symbol.kind]
-            yield Connector(symbol.name, kind, symbol.bodies, symbol.points, share * seen.size, color)
+            kind, fraction, color = CONNECTORS[symbol.kind]
+            yield Connector(symbol.name, kind, symbol.bodies, symbol.points, fraction * skeleton_.size, color)
 
 
 def _lines(motion: Motion, seen: Skeleton) -> Iterator[Connector]:
@@ -85,8 +85,8 @@ def _lines(motion: Motion, seen: Skeleton) -> Iterator[Connector]:
                 points = tuple(symbol.points[slot] for slot in slots)
                 yield Connector(f"{symbol.name} {k + 1}", "line", bodies, points, ROPE * seen.size, BROWN)
         elif symbol.kind == "belt":
-            whole, radii = frames(motion), [radius or 0.0 for radius in symbol.radii]
-            centers = [points_at(whole[symbol.bodies[slot]], symbol.points[slot]).T for slot in (0, 1)]
+            poses, radii = frames(motion), [radius or 0.0 for radius in symbol.radii]
+            centers = [points_at(poses[symbol.bodies[slot]], symbol.points[slot]).T for slot in (0, 1)]
             course = belt_course(centers[0], centers[1], radii, symbol.crossed)
             outline = spatial_vectors(belt_outline(course, centers, radii, symbol.crossed))
             half = outline.shape[1] // 2
@@ -102,10 +102,10 @@ def _points(mechanism: Mechanism, seen: Skeleton) -> list[BodyPoint]:
         if isinstance(output, PointOutput):
             position = np.asarray(resolve(output.point, mechanism.parameter_values), float)
             points.append(BodyPoint(output.bodies[0], tuple(position.tolist()), name))
-    known = {(point.body, point.point) for point in points}
+    pairs = {(point.body, point.point) for point in points}
     for body, link in seen.links.items():
         for position, names in zip(link.points, link.names, strict=True):
-            if body != GROUND and (body, tuple(position.tolist())) not in known:
-                words = ", ".join(names) or "center of mass"
-                points.append(BodyPoint(body, tuple(position.tolist()), f"{body}: {words}"))
+            if body != GROUND and (body, tuple(position.tolist())) not in pairs:
+                label = ", ".join(names) or "center of mass"
+                points.append(BodyPoint(body, tuple(position.tolist()), f"{body}: {label}"))
     return points

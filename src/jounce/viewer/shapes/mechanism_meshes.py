@@ -122,18 +122,18 @@ def _planar_slide(motion: Motion, symbol: Symbol, layer: Mapping[str, float], si
     """Yield a rail on the first body, as long as the travel, and the block of a prismatic joint."""
     first, second = symbol.bodies[:2]
     middle, length = _rail(motion, symbol, 0.06 * size)
-    thick = THICKNESS * size
-    depth = layer[first] - (0.6 if first == GROUND else -0.2) * thick
-    yield first, box([length, 0.022 * size, 0.3 * thick], [*middle, depth], _turned_to(symbol.axis_on(0))), GRAY
+    thickness = THICKNESS * size
+    depth = layer[first] - (0.6 if first == GROUND else -0.2) * thickness
+    yield first, box([length, 0.022 * size, 0.3 * thickness], [*middle, depth], _turned_to(symbol.axis_on(0))), GRAY
     if symbol.kind == "prismatic":
-        center = [*symbol.points[1], layer[second] + 0.2 * thick]
-        yield second, box([0.085 * size, 0.05 * size, 0.9 * thick], center, _turned_to(symbol.axis_on(1))), DARK
+        center = [*symbol.points[1], layer[second] + 0.2 * thickness]
+        yield second, box([0.085 * size, 0.05 * size, 0.9 * thickness], center, _turned_to(symbol.axis_on(1))), DARK
 
 
 def _groove(motion: Motion, symbol: Symbol, size: float, level: float = 0.0) -> Pieces:
     """Yield the curve or the lines of a surface on the first body, at the level of its layer if it is planar."""
-    whole, body = frames(motion), symbol.bodies[0]
-    visited = within(whole[body], points_at(whole[symbol.bodies[1]], symbol.points[1]))
+    poses, body = frames(motion), symbol.bodies[0]
+    visited = within(poses[body], points_at(poses[symbol.bodies[1]], symbol.points[1]))
     radius = (0.5 if symbol.kind == "curve" else 0.15) * BAR * size
     for line in shown(symbol.curve, visited, 0.1 * size):
         high = np.full((len(line), 1), level + 0.4 * THICKNESS * size)
@@ -142,12 +142,12 @@ def _groove(motion: Motion, symbol: Symbol, size: float, level: float = 0.0) -> 
 
 def _disc_cam(motion: Motion, symbol: Symbol, layer: Mapping[str, float], size: float, color: Color) -> Pieces:
     """Yield a roller at the point of a follower, and, for a motion of a whole turn, the plate cam."""
-    (disc, moved), radius = symbol.bodies, 2.0 * PIN * size
+    (disc, follower), radius = symbol.bodies, 2.0 * PIN * size
     low, high = layer[disc], layer[disc] + 0.8 * THICKNESS * size
     center = [*symbol.points[1], 0.5 * (low + high)]
-    yield moved, cylinder(radius, high - low, center=center), DARK
-    whole = frames(motion)
-    pitch, is_whole = pitch_curve(within(whole[disc], points_at(whole[moved], symbol.points[1])))
+    yield follower, cylinder(radius, high - low, center=center), DARK
+    poses = frames(motion)
+    pitch, is_whole = pitch_curve(within(poses[disc], points_at(poses[follower], symbol.points[1])))
     if is_whole:
         profile = Polygon(pitch).buffer(-radius)
         if isinstance(profile, Polygon) and not profile.is_empty:
@@ -162,10 +162,10 @@ def _turned_to(axis: Point) -> Float[np.ndarray, "3 3"]:
 
 def _rail(motion: Motion, symbol: Symbol, margin: float) -> tuple[Point, float]:
     """Return the middle and the length of the line on the first body along which the second travels, m."""
-    whole, axis = frames(motion), symbol.axis_on(0) / np.linalg.norm(symbol.axis_on(0))
-    point = points_at(whole[symbol.bodies[1]], symbol.points[1])
-    along = (within(whole[symbol.bodies[0]], point) - symbol.points[0]) @ axis
-    low, high = float(np.nanmin(along)), float(np.nanmax(along))
+    poses, axis = frames(motion), symbol.axis_on(0) / np.linalg.norm(symbol.axis_on(0))
+    point = points_at(poses[symbol.bodies[1]], symbol.points[1])
+    travel = (within(poses[symbol.bodies[0]], point) - symbol.points[0]) @ axis
+    low, high = float(np.nanmin(travel)), float(np.nanmax(travel))
     return symbol.points[0] + axis * 0.5 * (low + high), high - low + 2 * margin
 
 
@@ -221,35 +221,35 @@ def _shaft_wheels(symbol: Symbol, size: float, colors: Mapping[str, Color]) -> P
     for slot, (body, radius) in enumerate(zip(symbol.bodies[:2], symbol.radii, strict=False)):
         if radius is None or body == GROUND:
             continue
-        axis, center, thick = symbol.axis_on(slot), symbol.points[slot], 1.4 * BAR * size
-        yield body, cylinder(radius, thick, axis, center), colors[body]
+        axis, center, thickness = symbol.axis_on(slot), symbol.points[slot], 1.4 * BAR * size
+        yield body, cylinder(radius, thickness, axis, center), colors[body]
         mark = rotation_to(axis) @ np.array([0.5 * radius, 0.0, 0.0])
-        yield body, box([0.9 * radius, 0.1 * radius, 1.1 * thick], center + mark, rotation_to(axis)), DARK
+        yield body, box([0.9 * radius, 0.1 * radius, 1.1 * thickness], center + mark, rotation_to(axis)), DARK
 
 
 def _rack(motion: Motion, symbol: Symbol, size: float, colors: Mapping[str, Color]) -> Pieces:
     """Yield the rack on the first body along which a pinion rolls, as long as its travel; nothing for wheels."""
     if symbol.kind != "rolling":
         return
-    body, thin = symbol.bodies[0], 0.7 * BAR * size
+    body, thickness = symbol.bodies[0], 0.7 * BAR * size
     middle, length = _rail(motion, symbol, 0.08 * size)
     color = GRAY if body == GROUND else colors[body]
-    yield body, box([1.6 * thin, 1.6 * thin, length], middle, rotation_to(symbol.axis_on(0))), color
+    yield body, box([1.6 * thickness, 1.6 * thickness, length], middle, rotation_to(symbol.axis_on(0))), color
 
 
 def _spatial_slide(motion: Motion, symbol: Symbol, size: float) -> Pieces:
     """Yield a rail on the first body, as long as the travel of the second, and the sliding part."""
     first, second = symbol.bodies[:2]
     middle, length = _rail(motion, symbol, 0.08 * size)
-    axis, other, thin = symbol.axis_on(0), symbol.axis_on(1), 0.7 * BAR * size
+    axis, other, thickness = symbol.axis_on(0), symbol.axis_on(1), 0.7 * BAR * size
     if symbol.kind == "prismatic":
-        yield first, box([1.6 * thin, 1.6 * thin, length], middle, rotation_to(axis)), GRAY
+        yield first, box([1.6 * thickness, 1.6 * thickness, length], middle, rotation_to(axis)), GRAY
         yield second, box([0.05 * size, 0.05 * size, 0.09 * size], symbol.points[1], rotation_to(other)), DARK
         return
-    yield first, cylinder(thin, length, axis, middle), GRAY
+    yield first, cylinder(thickness, length, axis, middle), GRAY
     if symbol.kind == "screw":
-        share = np.linspace(0.0, 1.0, THREADS * 16)
-        angle = 2 * np.pi * THREADS * share
-        helix = np.stack([thin * np.cos(angle), thin * np.sin(angle), (share - 0.5) * length], axis=1)
-        yield first, tube(helix @ rotation_to(axis).T + middle, 0.35 * thin), GRAY
+        fractions = np.linspace(0.0, 1.0, THREADS * 16)
+        angle = 2 * np.pi * THREADS * fractions
+        helix = np.stack([thickness * np.cos(angle), thickness * np.sin(angle), (fractions - 0.5) * length], axis=1)
+        yield first, tube(helix @ rotation_to(axis).T + middle, 0.35 * thickness), GRAY
     yield second, sleeve(0.85 * BAR * size, 1.7 * BAR * size, 0.08 * size, other, symbol.points[1]), DARK

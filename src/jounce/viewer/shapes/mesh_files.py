@@ -53,8 +53,8 @@ class MeshFiles:
                 parts = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=_resolver(file)).dump()
         except Exception:  # noqa: BLE001 - mesh readers raise errors of many kinds; bars are shown instead
             return []
-        whole = (part for part in parts if isinstance(part, trimesh.Trimesh) and 0 < len(part.faces) <= LARGEST)
-        return [(part, _color(part)) for part in whole]
+        meshes = (part for part in parts if isinstance(part, trimesh.Trimesh) and 0 < len(part.faces) <= LARGEST)
+        return [(part, _color(part)) for part in meshes]
 
     def _file(self, name: str) -> str | None:
         """Return the file of a mesh: relative to the robot file, or in the folder of its package above it."""

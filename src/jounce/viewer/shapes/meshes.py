@@ -38,8 +38,8 @@ def rotation_to(axis: Position) -> Rotation:
 
 def transformed(mesh: Trimesh, center: Position = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
     """Return a mesh after a rotation and a translation."""
-    turned = mesh.vertices if rotation is None else mesh.vertices @ rotation.T
-    return Trimesh(turned + np.asarray(center), mesh.faces, process=False)
+    rotated = mesh.vertices if rotation is None else mesh.vertices @ rotation.T
+    return Trimesh(rotated + np.asarray(center), mesh.faces, process=False)
 
 
 def merged(meshes: Sequence[Trimesh]) -> Trimesh:
@@ -132,8 +132,8 @@ def _toothed(radius: float, module: float) -> FlatPoints:
         teeth, corners = max(8, round(2 * radius / abs(module))), module * np.array([-0.55, -0.55, 0.45, 0.45])
     steps = np.arange(teeth * len(corners)) / len(corners)
     angle = 2 * np.pi / teeth * (steps + 0.1 * np.tile((np.arange(len(corners)) % 2) * 2.0 - 1.0, teeth))
-    reach = radius + np.tile(corners, teeth)
-    return np.stack([reach * np.cos(angle), reach * np.sin(angle)], axis=1)
+    radii = radius + np.tile(corners, teeth)
+    return np.stack([radii * np.cos(angle), radii * np.sin(angle)], axis=1)
 
 
 def tube(line: Float[np.ndarray, "points 3"], radius: float) -> Trimesh:
@@ -144,15 +144,15 @@ def tube(line: Float[np.ndarray, "points 3"], radius: float) -> Trimesh:
 def coil(turns: int, radius: float, wire: float) -> Trimesh:
     """Return a coil spring of length one along z, to be stretched, with a thickness of its wire."""
     height = np.linspace(0.0, 1.0, 16 * turns + 1)
-    around = np.clip((height - 0.1) / 0.8, 0, 1) * 2 * np.pi * turns
-    reach = radius * np.clip(np.minimum(height, 1 - height) / 0.1, 0, 1)
-    return tube(np.stack([reach * np.cos(around), reach * np.sin(around), height], axis=1), wire)
+    angles = np.clip((height - 0.1) / 0.8, 0, 1) * 2 * np.pi * turns
+    radii = radius * np.clip(np.minimum(height, 1 - height) / 0.1, 0, 1)
+    return tube(np.stack([radii * np.cos(angles), radii * np.sin(angles), height], axis=1), wire)
 
 
 def arc_arrow() -> Trimesh:
     """Return a counterclockwise arrow around z on a circle of radius one: the symbol of a torque."""
     angle = np.linspace(0.0, 1.45 * np.pi, 40)
     line = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
-    ahead = np.array([-line[-1, 1], line[-1, 0], 0.0])
+    normal = np.array([-line[-1, 1], line[-1, 0], 0.0])
     head = creation.cone(0.22, 0.55, sections=AROUND)
-    return merged([tube(line, 0.08), transformed(_flat_walls(head), line[-1] - 0.05 * ahead, rotation_to(ahead))])
+    return merged([tube(line, 0.08), transformed(_flat_walls(head), line[-1] - 0.05 * normal, rotation_to(normal))])

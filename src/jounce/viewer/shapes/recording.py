@@ -187,8 +187,8 @@ class Recording(abc.ABC):
     def box(self) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
         """Corners of the bounding box of all moving parts over all instants, m."""
         corners = [self.global_point(body, corner) for body, box in self.appearance.corners().items() for corner in box]
-        every = np.concatenate([self.position.reshape(-1, 3), *corners])
-        return every.min(axis=0), every.max(axis=0)
+        all_points = np.concatenate([self.position.reshape(-1, 3), *corners])
+        return all_points.min(axis=0), all_points.max(axis=0)
 
     @cached_property
     def size(self) -> float:
@@ -198,8 +198,8 @@ class Recording(abc.ABC):
 
     def first_moving_point(self) -> BodyPoint:
         """Return the first point that moves by more than rounding, or the first of all if none does."""
-        points, least = self.appearance.points, 1e-9 * self.size
-        return next((point for point in points if np.ptp(self.motion(point)[:, 0], axis=0).max() > least), points[0])
+        points, bound = self.appearance.points, 1e-9 * self.size
+        return next((point for point in points if np.ptp(self.motion(point)[:, 0], axis=0).max() > bound), points[0])
 
 
 def poses(motion: Motion) -> tuple[Positions, Quaternions]:
@@ -230,8 +230,8 @@ def rotated(
     """
     scalar, axis = quaternion[..., :1], quaternion[..., 1:]
     axis, vector = np.broadcast_arrays(axis, vector)
-    once = np.cross(axis, vector)
-    return vector + 2 * (scalar * once + np.cross(axis, once))
+    product = np.cross(axis, vector)
+    return vector + 2 * (scalar * product + np.cross(axis, product))
 
 
 def spatial_vectors(values: Float[np.ndarray, "*batch components"]) -> Float[np.ndarray, "*batch 3"]:

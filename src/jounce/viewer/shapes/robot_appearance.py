@@ -48,12 +48,12 @@ def robot_appearance(robot: Robot, path: Path | None = None, allow: Iterable[str
         if link in robot.frames:
             body, position, rotation = _body_of(robot, link)
             shapes_of_links[body] += [
-                dataclasses.replace(each, mesh=transformed(each.mesh, position, rotation)) for each in shapes
+                dataclasses.replace(shape, mesh=transformed(shape.mesh, position, rotation)) for shape in shapes
             ]
     bars = _bars(robot, size)
-    bare = not any(shapes_of_links.values())
+    has_no_shapes = not any(shapes_of_links.values())
     for link in links:  # a base without shapes gets a support only if all links are bars
-        if not shapes_of_links[link] and (bare or link != robot.base):
+        if not shapes_of_links[link] and (has_no_shapes or link != robot.base):
             shapes_of_links[link] = bars[link]
     return Appearance(shapes_of_links, (), list(_points(robot)), size, upward(robot.gravity))
 
@@ -92,32 +92,32 @@ def _ends(robot: Robot) -> dict[str, list[Vector]]:
 
 def _bars(robot: Robot, size: float) -> Shapes:
     """Return bars from each joint to the next, and cylinders and boxes for the joints."""
-    thin = 0.016 * size
+    radius = 0.016 * size
     colors = {link: BODY_COLORS[k % len(BODY_COLORS)] for k, link in enumerate(robot.moving_links)}
     colors[robot.base] = DARK
     shapes: Shapes = {}
     for body, ends in _ends(robot).items():
-        bars = [capsule(np.zeros(3), end, thin) for end in ends if np.linalg.norm(end) > 1e-3 * size]
+        bars = [capsule(np.zeros(3), end, radius) for end in ends if np.linalg.norm(end) > 1e-3 * size]
         shapes[body] = [ColoredMesh(merged(bars), colors[body])] if bars else []
         if body == robot.base:
             shapes[body].append(ColoredMesh(cylinder(0.06 * size, 0.02 * size, upward(robot.gravity)), DARK))
         elif not bars:
-            shapes[body].append(ColoredMesh(sphere(1.4 * thin), colors[body]))
+            shapes[body].append(ColoredMesh(sphere(1.4 * radius), colors[body]))
     for joint in robot.joints.values():
         if joint.moving and joint.turning:
-            shapes[joint.child].append(ColoredMesh(cylinder(1.35 * thin, 4.2 * thin, joint.axis), DARK))
+            shapes[joint.child].append(ColoredMesh(cylinder(1.35 * radius, 4.2 * radius, joint.axis), DARK))
         elif joint.moving:
-            block = box([3 * thin, 3 * thin, 5 * thin], rotation=rotation_to(joint.axis))
+            block = box([3 * radius, 3 * radius, 5 * radius], rotation=rotation_to(joint.axis))
             shapes[joint.child].append(ColoredMesh(block, DARK))
-            shapes[joint.child].append(ColoredMesh(cylinder(0.6 * thin, 10 * thin, joint.axis), GRAY))
+            shapes[joint.child].append(ColoredMesh(cylinder(0.6 * radius, 10 * radius, joint.axis), GRAY))
     return shapes
 
 
 def _points(robot: Robot) -> Iterator[BodyPoint]:
     """Yield the tips of the branches, then all other links, as points."""
     parents = {joint.parent for joint in robot.joints.values()}
-    moving = [link for link in robot.links if robot.frames[link].body >= 0]
-    tips = [link for link in moving if link not in parents]
-    for link in [*reversed(tips), *(link for link in moving if link in parents)]:
+    links = [link for link in robot.links if robot.frames[link].body >= 0]
+    tips = [link for link in links if link not in parents]
+    for link in [*reversed(tips), *(link for link in links if link in parents)]:
         body, position, _ = _body_of(robot, link)
         yield BodyPoint(body, tuple(position.tolist()), link)

@@ -63,8 +63,8 @@ def _visual(visual: Element, materials: dict[str, Rgba | None], files: MeshFiles
     shape = geometry.children[0] if geometry is not None and geometry.children else None
     if shape is None:
         return []
-    own = visual.first("material")
-    rgba = None if own is None else _rgba(own) or materials.get(own.attributes.get("name", ""))
+    material = visual.first("material")
+    rgba = None if material is None else _rgba(material) or materials.get(material.attributes.get("name", ""))
     position, rotation = _origin(visual.first("origin"))
     return [colored(transformed(mesh, position, rotation), rgba or color) for mesh, color in _urdf_shape(shape, files)]
 
@@ -123,8 +123,8 @@ def _of_mjcf(root: Element, path: Path, allow: Iterable[str | PathLike[str]]) ->
             mujoco.mju_quat2Mat(rotation, model.geom_quat[k])
             material = model.geom_matid[k]
             rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[k]
-            shown = colored(transformed(mesh, model.geom_pos[k], rotation.reshape(3, 3)), tuple(rgba.tolist()))
-            shapes_of_links.setdefault(names[model.geom_bodyid[k]], []).append(shown)
+            shape = colored(transformed(mesh, model.geom_pos[k], rotation.reshape(3, 3)), tuple(rgba.tolist()))
+            shapes_of_links.setdefault(names[model.geom_bodyid[k]], []).append(shape)
     return shapes_of_links
 
 
@@ -142,9 +142,9 @@ def _geom(model: Any, k: int, mujoco: Any) -> Trimesh | None:
     if kind == int(kinds.mjGEOM_ELLIPSOID):
         return sphere(1.0).apply_scale(size)
     if kind == int(kinds.mjGEOM_MESH):
-        which = int(model.geom_dataid[k])
-        first, count = int(model.mesh_vertadr[which]), int(model.mesh_vertnum[which])
-        begin, number = int(model.mesh_faceadr[which]), int(model.mesh_facenum[which])
-        vertices, faces = model.mesh_vert[first : first + count], model.mesh_face[begin : begin + number]
+        mesh_index = int(model.geom_dataid[k])
+        first, count = int(model.mesh_vertadr[mesh_index]), int(model.mesh_vertnum[mesh_index])
+        first_face, number = int(model.mesh_faceadr[mesh_index]), int(model.mesh_facenum[mesh_index])
+        vertices, faces = model.mesh_vert[first : first + count], model.mesh_face[first_face : first_face + number]
         return Trimesh(np.array(vertices), np.array(faces), process=False)
     return None

@@ -36,10 +36,10 @@ def sdf_shapes(root: Element, files: MeshFiles) -> Shapes:
     frames = Frames(chosen, named(chosen))
     shapes_of_links: Shapes = {}
     for name, link in frames.elements.items():
-        shown = shapes_of_links.setdefault(name, []) if link.tag == "link" else []
+        shapes = shapes_of_links.setdefault(name, []) if link.tag == "link" else []
         for visual in link.every("visual") if link.tag == "link" else ():
             with suppress(RobotFileError, ValueError):  # a bar replaces a shape with invalid numbers
-                shown += _visual(visual, name, frames, files)
+                shapes += _visual(visual, name, frames, files)
     return shapes_of_links
 
 

@@ -43,19 +43,19 @@ def cam_mechanism(cam: PlateCam) -> Mechanism:
         pivot, angle = [follower.center_distance, 0.0], -start - float(cam.table.lift[0])
         guided = Revolute((GROUND, "follower"), pivot, [0, 0])
         lift = CoordinateDriver(("follower", GROUND), "angle", cam.law, ratio=1.0, offset=start)
-        body, shown = Body(pivot, angle), AngleOutput("follower")
+        body, output = Body(pivot, angle), AngleOutput("follower")
     else:
         height = start + float(cam.table.lift[0])
         guided = Prismatic((GROUND, "follower"), [follower.offset, 0], [0, 0], [0, 1], [0, 1])
         lift = CoordinateDriver((GROUND, "follower"), "y", cam.law, offset=start)
-        body, shown = Body([follower.offset, height]), PointOutput("follower", [0, 0])
+        body, output = Body([follower.offset, height]), PointOutput("follower", [0, 0])
     return Mechanism(
         title=cam.title or "plate cam",
         space="planar",
         bodies={"cam": Body([0, 0]), "follower": body},
         joints={"axle": Revolute((GROUND, "cam"), [0, 0], [0, 0]), "guide": guided},
         drivers={"turn": CoordinateDriver((GROUND, "cam"), "angle", turn), "lift": lift},
-        outputs={"follower": shown},
+        outputs={"follower": output},
         time=np.linspace(0.0, 2 * np.pi, INSTANTS),
     )
 
@@ -86,11 +86,11 @@ class CamSubject(MechanismSubject):
         return recorded(motion, appearance)
 
 
-def _outlines(cam: PlateCam, thick: float) -> Iterator[tuple[str, Trimesh]]:
+def _outlines(cam: PlateCam, thickness: float) -> Iterator[tuple[str, Trimesh]]:
     """Yield the plate of the cam, then the contact part and the stem of the follower, each in its body frame."""
     follower, width = cam.follower, STEM * cam.base_radius
-    yield "cam", extruded(Polygon(cam.table.profile.T).buffer(0), 0.0, 0.8 * thick, sharp=False)
-    low, high = 0.1 * thick, 0.7 * thick
+    yield "cam", extruded(Polygon(cam.table.profile.T).buffer(0), 0.0, 0.8 * thickness, sharp=False)
+    low, high = 0.1 * thickness, 0.7 * thickness
     if (face := cam.face) is not None:
         ends = sorted((-1.0 if follower.turning else 1.0) * end.value for end in face)
         foot = -getattr(follower, "face_offset", 0.0)
@@ -103,14 +103,14 @@ def _outlines(cam: PlateCam, thick: float) -> Iterator[tuple[str, Trimesh]]:
         return
     tip = np.array([-follower.arm, 0.0] if isinstance(follower, OscillatingFollower) else [0.0, 0.0])
     end = np.zeros(2) if follower.turning else np.array([0.0, 1.5 * cam.base_radius])
-    away = (end - tip) / np.linalg.norm(end - tip)
+    direction = (end - tip) / np.linalg.norm(end - tip)
     if follower.radius:
         yield "follower", wheel(follower.radius, low, high, tip)
-        yield "follower", plate(np.stack([tip, end]), width, high, high + 0.5 * thick)
+        yield "follower", plate(np.stack([tip, end]), width, high, high + 0.5 * thickness)
         return
-    side, neck = np.array([-away[1], away[0]]) * width, tip + 4 * width * away
+    side, neck = np.array([-direction[1], direction[0]]) * width, tip + 4 * width * direction
     if follower.turning:  # the edge points to the cam, perpendicular to the arm
-        away, neck = np.array([0.0, 1.0]), tip + np.array([0.0, 4 * width])
+        direction, neck = np.array([0.0, 1.0]), tip + np.array([0.0, 4 * width])
         side = np.array([width, 0.0])
     yield "follower", extruded(Polygon([tip, neck + side, neck - side]), low, high)
     yield "follower", plate(np.stack([neck, end]), width, low, high)

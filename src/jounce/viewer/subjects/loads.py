@@ -33,14 +33,14 @@ def mechanism_loads(motion: Motion, solved: Bool[np.ndarray, " all"]) -> list[Lo
         return []
     if motion.order < 2:
         raise JounceError("forces need accelerations; set the order to 2 or more", name="order", value=motion.order)
-    seen = skeleton(motion.mechanism)
-    whole = {body: frame[solved] for body, frame in frames(motion).items()}
-    loads = [_reaction(motion, solved, whole, symbol, "reaction") for symbol in seen.symbols]
-    loads += [_reaction(motion, solved, whole, symbol, "driver") for symbol in seen.drivers]
-    for symbol in seen.forces:
+    skeleton_ = skeleton(motion.mechanism)
+    poses = {body: frame[solved] for body, frame in frames(motion).items()}
+    loads = [_reaction(motion, solved, poses, symbol, "reaction") for symbol in skeleton_.symbols]
+    loads += [_reaction(motion, solved, poses, symbol, "driver") for symbol in skeleton_.drivers]
+    for symbol in skeleton_.forces:
         force, size = motion.mechanism.forces[symbol.name], applied_force(motion, symbol.name).values[solved][:, 0]
-        points = [points_at(whole[body], point) for body, point in zip(symbol.bodies, symbol.points, strict=True)]
-        vector = _applied(force, symbol, size, whole, points)
+        points = [points_at(poses[body], point) for body, point in zip(symbol.bodies, symbol.points, strict=True)]
+        vector = _applied(force, symbol, size, poses, points)
         if vector is not None:
             pair = {"force" if force.unit == "N" else "torque": vector}
             loads.append(Load(symbol.name, "applied", spatial_vectors(points[-1]), **pair))
@@ -48,7 +48,7 @@ def mechanism_loads(motion: Motion, solved: Bool[np.ndarray, " all"]) -> list[Lo
 
 
 def _reaction(
-    motion: Motion, solved: Bool[np.ndarray, " all"], whole: dict[str, Frame], symbol: Symbol, kind: str
+    motion: Motion, solved: Bool[np.ndarray, " all"], poses: dict[str, Frame], symbol: Symbol, kind: str
 ) -> Load:
     """Return the load of a joint or a driver on its second body."""
     slot = min(1, len(symbol.bodies) - 1)
@@ -58,7 +58,7 @@ def _reaction(
         torque = _about_z(torque[:, 0])
     else:
         torque = torque[:, 0]
-    point = points_at(whole[symbol.bodies[slot]], symbol.points[slot])
+    point = points_at(poses[symbol.bodies[slot]], symbol.points[slot])
     return Load(symbol.name, kind, spatial_vectors(point), spatial_vectors(force), torque)
 
 
@@ -70,18 +70,18 @@ def _applied(
     force: Any,
     symbol: Symbol,
     size: Float[np.ndarray, "time *component"],
-    whole: dict[str, Frame],
+    poses: dict[str, Frame],
     points: list[Float[np.ndarray, "time component"]],
 ) -> Vectors | None:
     """Return a force or a torque as a global vector; None if its direction is unknown."""
     if size.ndim == 2:  # by components
         if getattr(force, "frame", "global") == "body":
-            size = np.einsum("tck,tk->tc", whole[symbol.bodies[-1]][:, :, 1:], size)
+            size = np.einsum("tck,tk->tc", poses[symbol.bodies[-1]][:, :, 1:], size)
         return spatial_vectors(size)
     axis = symbol.axes[0]
     if axis is not None and (force.unit == "N" or len(axis) == 3):
-        along = whole[symbol.bodies[0]][:, :, 1:] @ (axis / np.linalg.norm(axis))
-        return spatial_vectors(along) * size[:, None]
+        direction = poses[symbol.bodies[0]][:, :, 1:] @ (axis / np.linalg.norm(axis))
+        return spatial_vectors(direction) * size[:, None]
     if force.unit != "N":
         return _about_z(size)
     if len(points) == 2 and hasattr(force, "point_i"):

@@ -56,8 +56,8 @@ class MechanismSubject:
             If the bodies cannot be assembled, or the motion ends at once.
         """
         mechanism = self.mechanism.with_parameters(**values)
-        moved = simulate if mechanism.initial else solve
-        return recorded(moved(mechanism, instants_shown(mechanism), order=order, strict=False))
+        solver = simulate if mechanism.initial else solve
+        return recorded(solver(mechanism, instants_shown(mechanism), order=order, strict=False))
 
 
 def mechanism_parameters(mechanism: Mechanism) -> tuple[Parameter, ...]:
@@ -119,24 +119,24 @@ class MechanismRecording(Recording):
         outputs, quantities = self.solution.mechanism.outputs, {}
         units = self.solution.mechanism.shown_units
         for name, values in self.solution.outputs.items():
-            words = tuple(quantity_word(outputs[name], k) for k in range(values.shape[1]))
+            names = tuple(quantity_word(outputs[name], k) for k in range(values.shape[1]))
             unit, factor = units.of(outputs[name].unit, name)
-            quantities[name] = self._quantity(unit, values * factor, words, outputs[name].labels)
+            quantities[name] = self._quantity(unit, values * factor, names, outputs[name].labels)
         return quantities or dict(map(self._turning, self.solution.mechanism.rigid_bodies))
 
     def _turning(self, body: str) -> tuple[str, Quantity]:
         rates = [quantity_word(AngularVelocityOutput(body), k) for k in range(self.order + 1)]
         if self.planar:
-            values, words = self.solution.angle(body).values, ("angle", *rates)
+            values, names = self.solution.angle(body).values, ("angle", *rates)
             unit, factor = self.solution.mechanism.shown_units.of("rad")
-            return f"angle of {body}", self._quantity(unit, values * factor, words[: values.shape[1]])
+            return f"angle of {body}", self._quantity(unit, values * factor, names[: values.shape[1]])
         values = self.solution.angular_velocity(body).values
         unit, factor = self.solution.mechanism.shown_units.of("rad/s")
         return f"angular velocity of {body}", self._quantity(unit, values * factor, tuple(rates[: values.shape[1]]))
 
-    def _quantity(self, unit: str, values: np.ndarray, words: tuple[str, ...], *labels: tuple[str, ...]) -> Quantity:
+    def _quantity(self, unit: str, values: np.ndarray, names: tuple[str, ...], *labels: tuple[str, ...]) -> Quantity:
         values = values[self.solved]
-        return Quantity(unit, values.reshape(*values.shape[:2], -1), words, *labels)
+        return Quantity(unit, values.reshape(*values.shape[:2], -1), names, *labels)
 
     def derivatives(self, body: str, point: Position) -> Float[np.ndarray, "time derivative 3"]:
         """Return the position and derivatives of a point."""

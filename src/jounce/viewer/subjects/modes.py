@@ -47,11 +47,11 @@ class ModesSubject:
         self.title, self.ground = (subject.name, subject.base) if robot else (subject.title, GROUND)
         self.name = f"Modes: {self.title or 'mechanism'}"
         count = len(linearize(equilibrium(subject, **settings)).modes)
-        own = () if robot else mechanism_parameters(subject)
-        taken = {parameter.name for parameter in own}
-        self._keys = _unused(taken, MODE), _unused(taken, AMPLITUDE)
+        parameters = () if robot else mechanism_parameters(subject)
+        names = {parameter.name for parameter in parameters}
+        self._keys = _unused(names, MODE), _unused(names, AMPLITUDE)
         chosen = Parameter(self._keys[0], 1.0, 1.0, max(float(count), 1.0 + 1e-9), GROUP, whole=True)
-        grouped = (dataclasses.replace(each, group="Parameters") for each in own)
+        grouped = (dataclasses.replace(each, group="Parameters") for each in parameters)
         self.parameters = (chosen, Parameter(self._keys[1], 0.1, 0.01, LARGEST, GROUP), *grouped)
 
     def solve(self, values: Mapping[str, float], _order: int) -> Recording:
@@ -62,22 +62,22 @@ class ModesSubject:
         JounceError
             If there is no equilibrium for these values, or joints cannot be closed at this amplitude.
         """
-        own = {name: value for name, value in values.items() if name not in self._keys}
+        parameters = {name: value for name, value in values.items() if name not in self._keys}
         mode, amplitude = (values[key] for key in self._keys)
-        subject = self.subject.with_parameters(**own) if isinstance(self.subject, Mechanism) else self.subject
-        rest = equilibrium(subject, **self.settings)
-        modes = linearize(rest).modes
+        subject = self.subject.with_parameters(**parameters) if isinstance(self.subject, Mechanism) else self.subject
+        state = equilibrium(subject, **self.settings)
+        modes = linearize(state).modes
         number = min(max(round(mode), 1), len(modes))
         motion = modes.motion(number, amplitude, duration=SWING)
         recording = recorded(motion, self.appearance, self.title, self.ground)
         row = modes.rows[number - 1]
         swings = f"{row['frequency']:.4g} Hz, damping ratio {row['damping_ratio']:.3g}"
         kind = swings if row["damped_frequency"] else row["kind"]
-        notice = f"mode {number} of {len(modes)}: {kind}; the equilibrium is {rest.stability}"
+        notice = f"mode {number} of {len(modes)}: {kind}; the equilibrium is {state.stability}"
         return dataclasses.replace(recording, notice=notice, values={**recording.values, **values})
 
 
-def _unused(taken: Collection[str], name: str) -> str:
-    while name in taken:
+def _unused(names: Collection[str], name: str) -> str:
+    while name in names:
         name += "_"
     return name

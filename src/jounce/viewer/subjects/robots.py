@@ -55,13 +55,13 @@ class RobotRecording(Recording):
 
     def quantities(self) -> dict[str, Quantity]:
         """Return the coordinates and torques of the joints."""
-        words = tuple(derivative_name(k) for k in range(self.order + 1))
+        names = tuple(derivative_name(k) for k in range(self.order + 1))
         rates = (*TORQUES, *(f"{derivative_name(k)} rate" for k in range(5, 40)))
         coordinates, torques = {}, {}
         for k, name in enumerate(self.robot.joint_names):
             turning, values = self.robot.joints[name].turning, self.q[..., k : k + 1]
             unit, first = ("rad", "angle") if turning else ("m", "position")
-            coordinates[name] = Quantity(unit, values, (first, *words[1:]))
+            coordinates[name] = Quantity(unit, values, (first, *names[1:]))
             if self.torques is not None:
                 unit, first = ("N*m", "torque") if turning else ("N", "force")
                 values = self.torques[..., k : k + 1]
@@ -184,13 +184,13 @@ def swing_of(joint: Joint, limits: Limits) -> tuple[float, float, float, float]:
     return low, high, 0.5 * (low + high), min(0.2 * (high - low), reach)
 
 
-def swing_parameters(robot: Robot, names: tuple[str, ...], share: float) -> tuple[Parameter, ...]:
+def swing_parameters(robot: Robot, names: tuple[str, ...], fraction: float) -> tuple[Parameter, ...]:
     """Return the parameters of swings: the period, and the amplitude, times a share, and middle of each joint."""
     swings, middles = [], []
     limits = robot.limits  # with those of the joints that follow
     for joint in (robot.joints[name] for name in names):
         low, high, middle, swing = swing_of(joint, limits[joint.name])
-        swings.append(Parameter(f"{joint.name} swing", share * swing, 0.0, 0.5 * (high - low), "Swings (rad or m)"))
+        swings.append(Parameter(f"{joint.name} swing", fraction * swing, 0.0, 0.5 * (high - low), "Swings (rad or m)"))
         middles.append(Parameter(f"{joint.name} middle", middle, low, high, "Middles (rad or m)"))
     return (Parameter("period", _period(robot), 1.0, 20.0), *swings, *middles)
 

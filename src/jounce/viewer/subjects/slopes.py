@@ -83,12 +83,12 @@ def peak_slopes(motion: Motion, name: str, order: int) -> PeakSlopes:
     )
     mechanism, first = motion.mechanism, float(motion.time[0])
     times = [first] if instant == first else [first, instant]
-    alike = [column for column, (output, _) in scalars.items() if output == stem]
-    component = slice(None) if motion.outputs[stem].ndim == 2 else alike.index(name)
+    columns = [column for column, (output, _) in scalars.items() if output == stem]
+    component = slice(None) if motion.outputs[stem].ndim == 2 else columns.index(name)
 
     def height(parameters: dict[str, Any]) -> Any:
-        moved = solve(mechanism.with_parameters(**parameters), times, order=order).outputs[stem]
-        return sign * jnp.reshape(moved[-1, order], -1)[component].sum()
+        perturbed = solve(mechanism.with_parameters(**parameters), times, order=order).outputs[stem]
+        return sign * jnp.reshape(perturbed[-1, order], -1)[component].sum()
 
     given = {k: x for k, x in mechanism.parameters.items() if not isinstance(x, str | Expression)}
     gradient = jax.grad(height)({name: jnp.asarray(mechanism.parameter_values[name], float) for name in given})
@@ -158,6 +158,6 @@ def slopes_html(recording: Any, name: str, order: int) -> str:
     for parameter, slope in slopes.slopes.items():
         allowed = motion.mechanism.dimensions.get(parameter, ())
         percent = 0.01 * float(motion.mechanism.parameter_values[parameter]), "1 %"
-        step, words = STEPS.get(allowed[0], percent) if allowed else percent
-        lines.append(f"{parameter} +{words}: {slope * step:+.3g} {slopes.unit}")
+        step, label = STEPS.get(allowed[0], percent) if allowed else percent
+        lines.append(f"{parameter} +{label}: {slope * step:+.3g} {slopes.unit}")
     return "<br>".join(map(html.escape, lines))

@@ -61,10 +61,10 @@ def axial_equations(group: Group, order: int) -> list[tuple[str, str]]:
     pairs.append((r"\theta", words.polynomial(angle)))
     rate = _derivatives(group, 1, turning=True)[1]
     for body in "ij":
-        whole = [x.terms.get((), 0) for x in component_jacobian(rate, body, planar=False)]
-        if whole[:5] != [0] * 5 or abs(whole[5]) != 1:
+        constants = [x.terms.get((), 0) for x in component_jacobian(rate, body, planar=False)]
+        if constants[:5] != [0] * 5 or abs(constants[5]) != 1:
             raise UnwritableOperationError("its rate is not that of an angle about its axis")
-        pairs.append((rf"\Phi_{{q{body}}}", rf"\left[ \mathbf{{0}}, {'-' if whole[5] < 0 else ''}{_AXIS} \right]"))
+        pairs.append((rf"\Phi_{{q{body}}}", rf"\left[ \mathbf{{0}}, {'-' if constants[5] < 0 else ''}{_AXIS} \right]"))
     for n in range(1, order + 1):
         side = Polynomial({m: -c for m, c in levels[n].terms.items() if m != (("w", "j", n - 1, 2),)})
         if any(atom[0] != "f" for m in side.terms for atom in m):
@@ -86,8 +86,8 @@ def _derivatives(group: Group, order: int, *, turning: bool) -> list[Polynomial]
     def residual(law: Any, poses: Any, instant: Any) -> Any:
         time = Jet((instant, np.ones((1, 1)), *[None] * (order - 1)))
         bodies = [spatial_pose(body, pose) for body, pose in poses.items()]
-        changed = with_fields(element, **values, motion=GivenLaw(tuple(law), time))
-        return with_rows(changed.residual(*bodies, time)).dense().coefficients
+        variant = with_fields(element, **values, motion=GivenLaw(tuple(law), time))
+        return with_rows(variant.residual(*bodies, time)).dense().coefficients
 
     instant = Entries(np.array([[graph.input(("t",))]]), float)
     coefficients = NamingReader(graph).function(residual, law, poses, instant)

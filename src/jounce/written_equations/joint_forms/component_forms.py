@@ -10,14 +10,14 @@ from jounce.written_equations.joint_forms.vector_forms import of_body, turning
 
 def in_coordinates(joint: SymbolicJoint, row: Polynomial) -> Polynomial:
     """Return a polynomial with derivatives of attitudes expressed by angles, or by angular velocities."""
-    turned: dict[Atom, Polynomial] = {}
+    replaced: dict[Atom, Polynomial] = {}
 
     def rule(monomial: Monomial) -> Polynomial | None:
         for atom in monomial:
             if atom[0] in ("A", "e") and atom[2] > 0:
-                if atom not in turned:
-                    turned[atom] = _planar(atom) if joint.planar else _spatial(atom, turned)
-                return turned[atom] * Polynomial({without(monomial, atom): Fraction(1)})
+                if atom not in replaced:
+                    replaced[atom] = _planar(atom) if joint.planar else _spatial(atom, replaced)
+                return replaced[atom] * Polynomial({without(monomial, atom): Fraction(1)})
         return None
 
     return row.replaced(rule)

@@ -30,8 +30,8 @@ SOURCE = re.compile(r"Sommer 2024, ((?:equations?|section) [0-9][0-9 ,and-]*)")
 
 def source_of(kind: type) -> str:
     """Return the equations of Sommer 2024 that the docstring of a class cites, or an empty text."""
-    for each in kind.__mro__:
-        text = " ".join(inspect.cleandoc(vars(each).get("__doc__") or "").split())
+    for base in kind.__mro__:
+        text = " ".join(inspect.cleandoc(vars(base).get("__doc__") or "").split())
         if match := SOURCE.search(text):
             return match[1].strip(" ,-").removesuffix(" and")
     return ""
@@ -153,19 +153,19 @@ def joint_equations(joint: SymbolicJoint) -> list[tuple[str, str]]:
     UnwritableOperationError
         If a right side has too many terms for a reader.
     """
-    words, vector_rows = Words(joint.planar), recognized(joint)
+    symbols, vector_rows = Words(joint.planar), recognized(joint)
     if vector_rows is None:
-        return _in_components(joint, words)
+        return _in_components(joint, symbols)
     equations = []
     for k, (_, levels) in enumerate(vector_rows, 1):
-        mark, within = (f"_{{{k}}}", f",{k}") if len(vector_rows) > 1 else ("", "")
-        equations.append((rf"\Phi{mark}", words.polynomial(_turned(joint, levels[0]))))
+        mark, suffix = (f"_{{{k}}}", f",{k}") if len(vector_rows) > 1 else ("", "")
+        equations.append((rf"\Phi{mark}", symbols.polynomial(_turned(joint, levels[0]))))
         for body in joint.slots:
-            blocks = ", ".join(total(x) for x in _jacobian(joint, words, levels[1], body))
-            equations.append((rf"\Phi_{{q{body}{within}}}", rf"\left[ {blocks} \right]"))
+            blocks = ", ".join(total(x) for x in _jacobian(joint, symbols, levels[1], body))
+            equations.append((rf"\Phi_{{q{body}{suffix}}}", rf"\left[ {blocks} \right]"))
         for n in range(1, len(levels)):
             side = _turned(joint, right_side(levels[n], n))
-            equations.append((words.side(n) + mark, words.polynomial(_checked(side, n))))
+            equations.append((symbols.side(n) + mark, symbols.polynomial(_checked(side, n))))
     if any(
         v[0] == "d"
         for _, levels in vector_rows
@@ -174,17 +174,17 @@ def joint_equations(joint: SymbolicJoint) -> list[tuple[str, str]]:
         for v in a[1:]
         if isinstance(v, tuple)
     ):
-        equations += _of_points(joint, words, len(joint.rows))
+        equations += _of_points(joint, symbols, len(joint.rows))
     return equations
 
 
-def _of_points(joint: SymbolicJoint, words: Words, levels: int) -> list[tuple[str, str]]:
+def _of_points(joint: SymbolicJoint, symbols: Words, levels: int) -> list[tuple[str, str]]:
     """Return the equations of the right sides of a pin or a ball."""
     points = {frame: field for field, frame in joint.vectors.items() if field.startswith("point")}
     equations = []
     for n in range(2, levels):
         parts = {(("vector", ("h", body, n, points[body])),): Fraction(1 if body == "i" else -1) for body in "ij"}
-        equations.append((words.side(n, own=True), words.polynomial(_turned(joint, Polynomial(parts)))))
+        equations.append((symbols.side(n, own=True), symbols.polynomial(_turned(joint, Polynomial(parts)))))
     return equations
 
 
@@ -200,46 +200,46 @@ def _checked(side: Polynomial, n: int) -> Polynomial:
     return side
 
 
-def _in_components(joint: SymbolicJoint, words: Words) -> list[tuple[str, str]]:
+def _in_components(joint: SymbolicJoint, symbols: Words) -> list[tuple[str, str]]:
     equations = []
     for k in range(len(joint.rows[0])):
-        mark, within = (f"_{{{k + 1}}}", f",{k + 1}") if len(joint.rows[0]) > 1 else ("", "")
+        mark, suffix = (f"_{{{k + 1}}}", f",{k + 1}") if len(joint.rows[0]) > 1 else ("", "")
         levels = [in_coordinates(joint, _checked(level[k], n)) for n, level in enumerate(joint.rows)]
-        equations.append((rf"\Phi{mark}", words.polynomial(levels[0])))
+        equations.append((rf"\Phi{mark}", symbols.polynomial(levels[0])))
         for body in joint.slots:
-            blocks = [words.polynomial(x) for x in component_jacobian(levels[1], body, planar=joint.planar)]
-            equations.append((rf"\Phi_{{q{body}{within}}}", rf"\left[ {', '.join(blocks)} \right]"))
+            blocks = [symbols.polynomial(x) for x in component_jacobian(levels[1], body, planar=joint.planar)]
+            equations.append((rf"\Phi_{{q{body}{suffix}}}", rf"\left[ {', '.join(blocks)} \right]"))
         for n in range(1, len(levels)):
             side = _checked(without_unknown(levels[n], n) * -1, n)
-            equations.append((words.side(n) + mark, words.polynomial(side)))
+            equations.append((symbols.side(n) + mark, symbols.polynomial(side)))
     return equations
 
 
-def _jacobian(joint: SymbolicJoint, words: Words, rate: Polynomial, body: str) -> tuple[list, list]:
+def _jacobian(joint: SymbolicJoint, symbols: Words, rate: Polynomial, body: str) -> tuple[list, list]:
     """Return the terms of the block of a body: for its position, and for its angle or rotation."""
     shifts, turns = [], []
     points = {frame: field for field, frame in joint.vectors.items() if field.startswith("point")}
     for monomial, factor in rate.terms.items():
         for atom in monomial:
-            rest = Polynomial({without(monomial, atom): factor})
+            remainder = Polynomial({without(monomial, atom): factor})
             if atom[:3] == ("phi", body, 1):
-                turns.append((rest, ""))
+                turns.append((remainder, ""))
             if atom[0] not in ("dot", "cross", "vector"):
                 continue
-            for k, moving in enumerate(atom[1:], 1):
-                if moving[0] == "d" and moving[1] == 1 and body in "ij":
-                    sign = rest * (1 if body == "j" else -1)
+            for k, coordinate in enumerate(atom[1:], 1):
+                if coordinate[0] == "d" and coordinate[1] == 1 and body in "ij":
+                    sign = remainder * (1 if body == "j" else -1)
                     shifts.append(_column(atom, k, sign, None, joint.planar))
                     turns.append(_column(atom, k, sign, (body, points[body]), joint.planar))
-                elif moving[:3] == ("r", body, 1):
-                    shifts.append(_column(atom, k, rest, None, joint.planar))
-                elif moving[0] == "u" and moving[1:3] == (body, 1):
-                    turns.append(_column(atom, k, rest, (body, moving[3]), joint.planar))
-    return words.terms(shifts), words.terms(turns)
+                elif coordinate[:3] == ("r", body, 1):
+                    shifts.append(_column(atom, k, remainder, None, joint.planar))
+                elif coordinate[0] == "u" and coordinate[1:3] == (body, 1):
+                    turns.append(_column(atom, k, remainder, (body, coordinate[3]), joint.planar))
+    return symbols.terms(shifts), symbols.terms(turns)
 
 
 def _column(
-    atom: Atom, k: int, rest: Polynomial, turned: tuple[str, str] | None, planar: bool
+    atom: Atom, k: int, remainder: Polynomial, turned: tuple[str, str] | None, planar: bool
 ) -> tuple[Polynomial, str]:
     """Return a term of a block: its factor, and the other vector times the derivative of the moving vector."""
     kind, *vectors = atom
@@ -249,13 +249,13 @@ def _column(
     elif planar:
         column = rf"\mathbf{{B}}_{turned[0]}{local(turned[1], turned[0])}"
     else:
-        column, rest = rf"\mathbf{{A}}_{turned[0]}{skew(local(turned[1], turned[0]))}", rest * -1
+        column, remainder = rf"\mathbf{{A}}_{turned[0]}{skew(local(turned[1], turned[0]))}", remainder * -1
     if kind == "vector":
-        return rest, column or unit
+        return remainder, column or unit
     other = in_brackets(of_vector(vectors[2 - k], planar)) + "^T"
     if kind == "dot":
-        return rest, f"{other} {column}".strip()
-    rest = rest if k == 2 else rest * -1
+        return remainder, f"{other} {column}".strip()
+    remainder = remainder if k == 2 else remainder * -1
     if turned is not None:  # R^T B = A
-        return rest, f"{other} {of_vector(('u', turned[0], 0, turned[1]), planar)}"
-    return rest, rf"{other} \mathbf{{R}}^T"
+        return remainder, f"{other} {of_vector(('u', turned[0], 0, turned[1]), planar)}"
+    return remainder, rf"{other} \mathbf{{R}}^T"

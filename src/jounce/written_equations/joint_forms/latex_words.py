@@ -17,9 +17,9 @@ _PRODUCTS = ("dot", "cross", "vector")
 
 def escaped(text: str) -> str:
     """Return the text of a user in LaTeX: ASCII, without commands."""
-    plain = " ".join(text.encode("ascii", "replace").decode().split())
+    ascii_text = " ".join(text.encode("ascii", "replace").decode().split())
     special = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-    return "".join(special.get(c, f"\\{c}" if c in "&%$#_{}" else c) for c in plain)
+    return "".join(special.get(c, f"\\{c}" if c in "&%$#_{}" else c) for c in ascii_text)
 
 
 def dotted(symbol: str, index: str, n: int) -> str:
@@ -66,11 +66,11 @@ def _turned(body: str, n: int, *, known: bool) -> str:
     if n == 0:
         return ""
     spin, last = (dotted(r"\tilde{\boldsymbol{\omega}}", f"_{body}'", k) for k in (0, n - 1))
-    named = {2: f"{spin} {spin}", 3: rf"\mathbf{{H}}_{body}'", 4: rf"\mathbf{{W}}_{body}'"}
+    symbols = {2: f"{spin} {spin}", 3: rf"\mathbf{{H}}_{body}'", 4: rf"\mathbf{{W}}_{body}'"}
     if n == 1:
         return spin
-    first = named.get(n, rf"\mathbf{{M}}_{{{body},{n}}}'")
-    return first if known else rf"\left( {first} + {last} \right)"
+    symbol = symbols.get(n, rf"\mathbf{{M}}_{{{body},{n}}}'")
+    return symbol if known else rf"\left( {symbol} + {last} \right)"
 
 
 def right_side_name(n: int, planar: bool) -> str:
@@ -109,8 +109,8 @@ class Words:
         groups: dict[Monomial, Polynomial] = {}
         for monomial, factor in row.terms.items():
             products = tuple(a for a in monomial if a[0] in _PRODUCTS)
-            others = tuple(a for a in monomial if a[0] not in _PRODUCTS)
-            groups[products] = groups.get(products, Polynomial({})) + Polynomial({others: factor})
+            factors = tuple(a for a in monomial if a[0] not in _PRODUCTS)
+            groups[products] = groups.get(products, Polynomial({})) + Polynomial({factors: factor})
         parts = [(group, " ".join(map(self._product, products))) for products, group in groups.items()]
         return total(self.terms(sorted(parts, key=lambda part: part[1], reverse=True)))
 
@@ -130,18 +130,18 @@ class Words:
 
     def _scalars(self, monomial: Monomial, factor: Fraction) -> tuple[int, str]:
         """Return the sign and the text of a product of numbers."""
-        size, above, below = abs(factor), [], []
+        size, numerator, denominator = abs(factor), [], []
         for atom, power in Counter(monomial).items():
-            under = atom[0] == "inverse"
-            text = self._scalar(atom[1] if under else atom)
+            is_inverse = atom[0] == "inverse"
+            text = self._scalar(atom[1] if is_inverse else atom)
             raised = text if power == 1 else f"{_base(text)}^{{{power}}}"
-            (below if under else above).append(raised)
+            (denominator if is_inverse else numerator).append(raised)
         if size.denominator != 1:
-            above.insert(0, rf"\tfrac{{{size.numerator}}}{{{size.denominator}}}")
-        elif size != 1 or not above:
-            above.insert(0, str(size.numerator))
-        text = " ".join(above)
-        return (1 if factor > 0 else -1), rf"\frac{{{text}}}{{{' '.join(below)}}}" if below else text
+            numerator.insert(0, rf"\tfrac{{{size.numerator}}}{{{size.denominator}}}")
+        elif size != 1 or not numerator:
+            numerator.insert(0, str(size.numerator))
+        text = " ".join(numerator)
+        return (1 if factor > 0 else -1), rf"\frac{{{text}}}{{{' '.join(denominator)}}}" if denominator else text
 
     def _product(self, atom: Atom) -> str:
         kind, *vectors = atom

@@ -80,20 +80,20 @@ class Polynomial:
 
     def replaced(self, rule: Callable[[Monomial], "Polynomial | None"]) -> "Polynomial":
         """Return the polynomial with terms replaced until a rule returns None for all terms."""
-        waiting, done = dict(self.terms), Polynomial({})
-        while waiting:
-            if len(waiting) + len(done.terms) > MOST_TERMS:
+        pending, result = dict(self.terms), Polynomial({})
+        while pending:
+            if len(pending) + len(result.terms) > MOST_TERMS:
                 raise TooManyTermsError(f"more than {MOST_TERMS} terms")
-            monomial, c = waiting.popitem()
+            monomial, c = pending.popitem()
             other = rule(monomial)
             if other is None:
-                done.terms[monomial] = done.terms.get(monomial, Fraction(0)) + c
+                result.terms[monomial] = result.terms.get(monomial, Fraction(0)) + c
                 continue
             for m, d in other.terms.items():
-                total = waiting.pop(m, Fraction(0)) + c * d
+                total = pending.pop(m, Fraction(0)) + c * d
                 if total:
-                    waiting[m] = total
-        return Polynomial(done.terms)
+                    pending[m] = total
+        return Polynomial(result.terms)
 
 
 def joined(*monomials: Monomial) -> Monomial:
@@ -108,7 +108,7 @@ def joined(*monomials: Monomial) -> Monomial:
 
 def without(monomial: Monomial, *atoms: Atom) -> Monomial:
     """Return a product without some of its atoms."""
-    left = list(monomial)
+    remaining = list(monomial)
     for atom in atoms:
-        left.remove(atom)
-    return tuple(left)
+        remaining.remove(atom)
+    return tuple(remaining)

@@ -110,24 +110,24 @@ def symbolic_joint(group: Group, pose_type: type, order: int) -> SymbolicJoint:
     ]
     values = [_values(group, fields, vectors, k) for k in range(group.instances)]
     derived = [
-        {name: tuple(evaluated(graph, n, known) for n in parts) for parts, name in reader.derived.items()}
-        for known in values
+        {name: tuple(evaluated(graph, n, values_here) for n in parts) for parts, name in reader.derived.items()}
+        for values_here in values
     ]
-    for known, derived_vectors in zip(values, derived, strict=True):
-        known |= {("v", name, c): part for name, parts in derived_vectors.items() for c, part in enumerate(parts)}
-    constants = [[evaluated(graph, number, known) for number in read.constants] for known in values]
+    for values_here, derived_vectors in zip(values, derived, strict=True):
+        values_here |= {("v", name, c): part for name, parts in derived_vectors.items() for c, part in enumerate(parts)}
+    constants = [[evaluated(graph, number, values_here) for number in read.constants] for values_here in values]
     vectors |= {name: name[-1] for name in reader.derived.values()}
     return SymbolicJoint(rows, vectors, planar, slots, constants, derived)
 
 
 def _values(group: Group, fields: dict[str, Any], vectors: dict[str, str], instance: int) -> dict[Atom, float]:
     """Return the values of the atoms of the fields of one joint of a group."""
-    known = {}
+    values = {}
     for name in fields:
         value = np.asarray(getattr(group.element, name))[..., instance, 0]
         parts = value.tolist() if name in vectors else [float(value)]
-        known |= {(("v", name, c) if name in vectors else ("k", name)): part for c, part in enumerate(parts)}
-    return known
+        values |= {(("v", name, c) if name in vectors else ("k", name)): part for c, part in enumerate(parts)}
+    return values
 
 
 def evaluated(graph: Graph, root: int, known: dict[Atom, float]) -> float:
@@ -221,13 +221,13 @@ class NamingReader(GraphReader):
     def _vector(self, given: Entries, slot: str) -> Entries:
         """Return a constant vector of a body, with a name of its own if it is computed from fields."""
         numbers = tuple(int(x) for x in given.numbers.ravel())
-        fixed = all(self._is_of_fields(x) for x in numbers)
-        if not fixed or all(self.graph.nodes[x].operation in ("input", "constant") for x in numbers):
+        is_of_fields = all(self._is_of_fields(x) for x in numbers)
+        if not is_of_fields or all(self.graph.nodes[x].operation in ("input", "constant") for x in numbers):
             return given
         if numbers not in self.derived:
             letters = iter(DERIVED)
-            taken = set(self.derived.values())
-            self.derived[numbers] = next(name for x in letters if (name := f"{x}_{slot}") not in taken)
+            names = set(self.derived.values())
+            self.derived[numbers] = next(name for x in letters if (name := f"{x}_{slot}") not in names)
         name = self.derived[numbers]
         parts = [self.graph.input(("v", name, c)) for c in range(len(numbers))]
         return Entries(np.array(parts, np.int64).reshape(given.shape), given.dtype)
@@ -269,8 +269,8 @@ class Expansion:
 
     def _expanded(self, number: int) -> Polynomial:
         node = self._graph.nodes[number]
-        fixed = all(x in self._fixed for x in node.operands)
-        if fixed and (node.operation != "input" or node.detail[0] in ("v", "k")):
+        is_constant = all(x in self._fixed for x in node.operands)
+        if is_constant and (node.operation != "input" or node.detail[0] in ("v", "k")):
             self._fixed.add(number)
         row = self._operation(node)
         if number not in self._fixed or all(_is_plain(atom) for m in row.terms for atom in m):

@@ -78,8 +78,8 @@ def _with_turned(joint: SymbolicJoint, monomial: Monomial) -> Polynomial | None:
             if other[0] != "v" or joint.vectors[other[1]] != body or (not joint.planar and other[2] != 0):
                 continue
             c = other[2] if joint.planar else row
-            rest = _turned(joint, body, n, other[1], c) + Polynomial({joined((atom,), (other,)): Fraction(-1)})
-            value = Polynomial.atom(("u", body, n, other[1], c)) + rest * -1
+            remainder = _turned(joint, body, n, other[1], c) + Polynomial({joined((atom,), (other,)): Fraction(-1)})
+            value = Polynomial.atom(("u", body, n, other[1], c)) + remainder * -1
             return value * Polynomial({without(monomial, atom, other): Fraction(1)})
     return None
 
@@ -92,12 +92,14 @@ def _in_products(row: Polynomial, count: int) -> Polynomial:
         if len(vectors) != 2:
             return None
         (x, a), (y, b) = ((vector[:-1], vector[-1]) for vector in vectors)
-        rest = Polynomial({without(monomial, *vectors): Fraction(1)})
+        remainder = Polynomial({without(monomial, *vectors): Fraction(1)})
         if (a, b) == (0, 0):
             others = Polynomial({joined(((*x, c),), ((*y, c),)): Fraction(-1) for c in range(1, count)})
-            return (Polynomial.atom(("dot", x, y)) + others) * rest
+            return (Polynomial.atom(("dot", x, y)) + others) * remainder
         if (a, b) == (0, 1) and count == 2 and x != y:
-            return (Polynomial.atom(("cross", x, y)) + Polynomial({joined(((*x, 1),), ((*y, 0),)): Fraction(1)})) * rest
+            return (
+                Polynomial.atom(("cross", x, y)) + Polynomial({joined(((*x, 1),), ((*y, 0),)): Fraction(1)})
+            ) * remainder
         return None
 
     return row.replaced(rule)
@@ -186,20 +188,20 @@ def in_angles(row: Polynomial) -> Polynomial:
                 if vector[0] not in ("u", "h") or vector[2] == 0 or vector[1] not in "ijm":
                     continue
                 a, b = (of_body(p, vector[1]) for p in turning(vector[2], known=vector[0] == "h"))
-                still = ("u", vector[1], 0, vector[3])
-                along, aside = _split(atom, k, still)
+                unit_atom = ("u", vector[1], 0, vector[3])
+                along, aside = _split(atom, k, unit_atom)
                 return (a * along + b * aside) * Polynomial({without(monomial, atom): Fraction(1)})
         return None
 
     return row.replaced(rule)
 
 
-def _split(atom: Atom, k: int, still: Atom) -> tuple[Polynomial, Polynomial]:
+def _split(atom: Atom, k: int, unit_atom: Atom) -> tuple[Polynomial, Polynomial]:
     """Return a product with a vector in the place of its k-th vector, and with that vector turned by a right angle."""
     kind, *vectors = atom
-    vectors[k - 1] = still
+    vectors[k - 1] = unit_atom
     along = Polynomial.atom((kind, *vectors))
     if kind == "vector":
-        return along, Polynomial.atom(("vector", ("R", still)))
+        return along, Polynomial.atom(("vector", ("R", unit_atom)))
     other = Polynomial.atom(("cross" if kind == "dot" else "dot", *vectors))
     return along, other * (1 if (kind == "dot") == (k == 1) else -1)

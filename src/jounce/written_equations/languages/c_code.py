@@ -65,8 +65,8 @@ class _File:
         if name == "not":
             return Text(f"!({operands[0].text})")
         if name == "where":
-            condition, yes, no = (f"({x.text})" if x.tightness < ATOM else x.text for x in operands)
-            return Text(f"({condition} ? {yes} : {no})")
+            condition, then, otherwise = (f"({x.text})" if x.tightness < ATOM else x.text for x in operands)
+            return Text(f"({condition} ? {then} : {otherwise})")
         if name in ("real", "whole"):
             return Text(f"({'double' if name == 'real' else 'int'})({operands[0].text})")
         if name in _HELPERS and node.kind == REAL:
@@ -104,8 +104,8 @@ class _File:
             if isinstance(argument.labels, str):
                 names.fix(argument.labels, argument.name)
         lines = [*self.described(function), self.head(function), "{"]
-        every = [(row[0], label) for stage in stages(function) for row in stage.rows for label in row[0].row(row[1])]
-        used = {argument.name for argument, label in every if label in needed}
+        entries = [(row[0], label) for stage in stages(function) for row in stage.rows for label in row[0].row(row[1])]
+        used = {argument.name for argument, label in entries if label in needed}
         lines += [f"    (void){x.name};" for x in function.arguments if x.name not in used]
         lines += [] if roots else ["    (void)out;"] + ["    (void)orders;"] * function.by_order
         place = 0
@@ -137,8 +137,8 @@ def c_file(code: Code, name: str) -> str:
     lines = ["/*", f" * {one_line(code.title)}: {code.subject}, written by jounce {__version__}.", " *"]
     for paragraph in code.about:
         lines += [*_comment(paragraph), " *"]
-    for what, labels in code.labels.items():
-        lines += [f" * {what}:", *wrapped([one_line(x) for x in labels], indent=" *   ")]
+    for noun, labels in code.labels.items():
+        lines += [f" * {noun}:", *wrapped([one_line(x) for x in labels], indent=" *   ")]
     lines += [" */", "#include <math.h>", ""]
     counts = {key: len(labels) for key, labels in code.labels.items()} | {"ORDER": code.order}
     lines += ["enum {", *(f"    {name.upper()}_{key} = {count}," for key, count in counts.items())]

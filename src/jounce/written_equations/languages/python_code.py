@@ -101,8 +101,8 @@ class NumPyModule:
             return infix(operands[0], "*", PRODUCT, Text("1.0" if name == "real" else "1"))
         if name in _LIBRARY:
             self._vectorized.add(name)
-        called = name if name in _LIBRARY else f"np.{_CALLED.get(name, name)}"
-        return Text(f"{called}({', '.join(x.text for x in operands)})")
+        function_name = name if name in _LIBRARY else f"np.{_CALLED.get(name, name)}"
+        return Text(f"{function_name}({', '.join(x.text for x in operands)})")
 
     def _table(self, values: tuple) -> str:
         if values not in self._tables:
@@ -135,12 +135,12 @@ class NumPyModule:
     def before(self, function: Function) -> list[str]:
         """Return the lines before the first results."""
         shapes = [f"np.shape({x.name}){_axes(x)}" for x in function.arguments]
-        whole = f"np.broadcast_shapes({', '.join(shapes)})"
+        shape = f"np.broadcast_shapes({', '.join(shapes)})"
         if not function.by_order:
             sizes = ", ".join(map(str, function.results.shape))
-            return [f"    out = np.zeros(({sizes}, *{whole}))"]
+            return [f"    out = np.zeros(({sizes}, *{shape}))"]
         sizes = "".join(f"{n}, " for n in function.results.shape[1:])
-        return [*_orders(function), f"    shape = {whole}", f"    out = np.zeros((orders, {sizes}*shape))"]
+        return [*_orders(function), f"    shape = {shape}", f"    out = np.zeros((orders, {sizes}*shape))"]
 
     def until(self, k: int) -> list[str]:
         """Return the lines before the results of a further order."""
@@ -164,8 +164,8 @@ def _assignment(name: str, text: str, kind: str) -> str:
 def _documented(function: Function) -> Iterator[str]:
     """Return the lines of the docstring of a function."""
     axes = ", ".join(function.axes) + ("," if len(function.axes) == 1 else "")
-    known = ", for as many orders as the arguments are enough for" if function.by_order else ""
-    first = f'"""{function.text}, ({axes}){known}.'
+    remark = ", for as many orders as the arguments are enough for" if function.by_order else ""
+    first = f'"""{function.text}, ({axes}){remark}.'
     paragraphs = [f"{x.name}: {x.text}." for x in function.arguments]
     yield from textwrap.wrap(first, WIDTH, subsequent_indent="    ", initial_indent="    ")
     yield ""
@@ -177,8 +177,8 @@ def _documented(function: Function) -> Iterator[str]:
 def _orders(function: Function) -> list[str]:
     """Return the line that computes the number of orders for which the arguments suffice."""
     shift = {x.name: 1 - x.lead for x in function.arguments if x.by_order}
-    known = [f"len({name})" + (f" {'+-'[n < 0]} {abs(n)}" if n else "") for name, n in shift.items()]
-    return [f"    orders = max(0, min({', '.join([*known, str(len(function.results))])}))"]
+    lengths = [f"len({name})" + (f" {'+-'[n < 0]} {abs(n)}" if n else "") for name, n in shift.items()]
+    return [f"    orders = max(0, min({', '.join([*lengths, str(len(function.results))])}))"]
 
 
 def _axes(argument: Argument) -> str:

@@ -79,8 +79,8 @@ class SymPyModule(NumPyModule):
             return Text("sp.true" if value else "sp.false")
         if not math.isfinite(value):
             return Text("sp.nan" if math.isnan(value) else "sp.oo" if value > 0 else "(-sp.oo)")
-        whole = float(value).is_integer() and abs(value) < 2**53
-        return Text(repr(int(value) if whole else value), SUM if value < 0 else ATOM)
+        is_integer = float(value).is_integer() and abs(value) < 2**53
+        return Text(repr(int(value) if is_integer else value), SUM if value < 0 else ATOM)
 
     def called(self, name: str, operands: Sequence[Text]) -> Text:
         """Return the text of a function of operands."""
@@ -89,10 +89,10 @@ class SymPyModule(NumPyModule):
             return Text(f"sp.Piecewise(({texts[1]}, {texts[0]}), ({texts[2]}, True))")
         if name in ("real", "whole"):
             return operands[0]
-        called = _CALLED.get(name, f"sp.{name}")
-        if called in _HELPERS:
-            self._vectorized.add(called)
-        return Text(f"{called}({', '.join(texts)})")
+        function_name = _CALLED.get(name, f"sp.{name}")
+        if function_name in _HELPERS:
+            self._vectorized.add(function_name)
+        return Text(f"{function_name}({', '.join(texts)})")
 
     def before(self, function: Function) -> list[str]:
         """Return the lines before the first results."""

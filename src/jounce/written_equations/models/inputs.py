@@ -33,9 +33,9 @@ class Inputs:
         ground = [0.0] * shifts + ([1.0, 0.0, 0.0, 0.0] if spatial else [0.0])
         at_rest = list(map(graph.constant, ground))
         self._place = np.array(at_rest + list(map(graph.input, self.coordinates)), np.int64).reshape(-1, width)
-        still = np.full(spins, graph.constant(0.0))
+        zeros = np.full(spins, graph.constant(0.0))
         moving = [[graph.input(name) for name in row] for row in self.derivatives]
-        self._moving = [np.concatenate([still, row]).reshape(-1, spins) for row in moving]
+        self._moving = [np.concatenate([zeros, row]).reshape(-1, spins) for row in moving]
         self._shifts, self._attitude = shifts, "quaternion" if spatial else "angle"
 
     def velocities(self, lead: int) -> Argument:

@@ -71,18 +71,18 @@ def mechanism_code(given: Mechanism | Motion, joint: str | None, order: int, qua
     model = given.model if isinstance(given, Motion) else model_of_equations(mechanism)
     graph = Graph()
     inputs = Inputs(graph, mechanism, model, order)
-    own, functions, labels = rows_of(mechanism, model, joint), [], {}
+    rows, functions, labels = rows_of(mechanism, model, joint), [], {}
     if CONSTRAINTS in quantities:
-        functions += _constraints(mechanism, model, inputs, own)
+        functions += _constraints(mechanism, model, inputs, rows)
     if FORCES in quantities:
         functions += force_functions(mechanism, model, inputs)
     if OUTPUTS in quantities:
         function, names = output_function(mechanism, model, inputs)
         functions, labels = [*functions, function], {"OUTPUTS": names}
-    named = {"COORDINATES": tuple(inputs.coordinates), "COLUMNS": inputs.columns, "ROWS": own} | labels
-    about = tuple(" ".join(text.split()) for text in (*(_ABOUT[x] for x in quantities), _PLACE, "SI units."))
+    constants = {"COORDINATES": tuple(inputs.coordinates), "COLUMNS": inputs.columns, "ROWS": rows} | labels
+    notes = tuple(" ".join(text.split()) for text in (*(_ABOUT[x] for x in quantities), _PLACE, "SI units."))
     subject = "constraint equations" if quantities == (CONSTRAINTS,) else "equations"
-    return Code(mechanism.title or "", subject, graph, order, named, about, tuple(functions))
+    return Code(mechanism.title or "", subject, graph, order, constants, notes, tuple(functions))
 
 
 def rows_of(mechanism: Mechanism, model: Model, joint: str | None) -> tuple[str, ...]:
@@ -91,11 +91,11 @@ def rows_of(mechanism: Mechanism, model: Model, joint: str | None) -> tuple[str,
     return tuple(row for row in rows if joint is None or row.rpartition(".")[0] == joint)
 
 
-def _constraints(mechanism: Mechanism, model: Model, inputs: Inputs, own: tuple[str, ...]) -> list[Function]:
+def _constraints(mechanism: Mechanism, model: Model, inputs: Inputs, names: tuple[str, ...]) -> list[Function]:
     """Return residual, Jacobian and right sides."""
     rows = equation_labels(mechanism, model)["row"].tolist()
     order_of_rows, rows_of_groups = row_order(mechanism, model).tolist(), group_rows(model)
-    chosen = [order_of_rows[rows.index(row)] for row in own]
+    chosen = [order_of_rows[rows.index(row)] for row in names]
     numbers: dict[int, tuple[Any, Any, Any]] = {}
     for group, part in zip(model.system.groups, rows_of_groups, strict=True):
         if any(row in range(part.start, part.stop) for row in chosen):

@@ -84,13 +84,13 @@ def _multipliers(mechanism: Mechanism, model: Model, inputs: Inputs, levels: int
     rows, order = equation_labels(mechanism, model)["row"].tolist(), row_order(mechanism, model)
     labels = tuple(tuple(f"{row}_lambda{k}" for row in rows) for k in range(max(1, levels - 1)))
     graph, zero = inputs.graph, inputs.graph.constant(0.0)
-    whole = np.full((levels, len(rows), levels), zero, np.int64)
+    array = np.full((levels, len(rows), levels), zero, np.int64)
     for k in range(levels - 1):
         given = np.zeros(len(rows), np.int64)
         given[order] = [graph.input(label) for label in labels[k]]
-        whole[k, :, k + 1 :] = _times(inputs, given, 1 / math.factorial(k))[:, None]
+        array[k, :, k + 1 :] = _times(inputs, given, 1 / math.factorial(k))[:, None]
     text = "lambda, lambda', ..., (order, row), as far as known: the first result needs none"
-    return Argument("multipliers", labels, text), Entries(whole, float)
+    return Argument("multipliers", labels, text), Entries(array, float)
 
 
 def _times(inputs: Inputs, numbers: np.ndarray, factor: float | int) -> np.ndarray:
@@ -108,10 +108,10 @@ def output_function(mechanism: Mechanism, model: Model, inputs: Inputs) -> tuple
         If the mechanism has no such output, or an output cannot be written out.
     """
     columns: dict[str, list[int]] = {}
-    lost = max((group.element.lost_orders for group in model.system.outputs), default=0)
+    extra = max((group.element.lost_orders for group in model.system.outputs), default=0)
     for group, names in zip(model.system.outputs, model.outputs, strict=True):
         rows = [_output_labels(mechanism, name) for name in names]
-        for k in range(inputs.order + 1 - lost):  # whether an angle is defined is judged by all rates that are given
+        for k in range(inputs.order + 1 - extra):  # whether an angle is defined is judged by all rates that are given
             order = k + group.element.lost_orders
 
             def value(bodies: Any, group: Any = group, order: int = order, k: int = k) -> Any:
@@ -130,7 +130,7 @@ def output_function(mechanism: Mechanism, model: Model, inputs: Inputs) -> tuple
     labels = tuple(row for name in known for row in _output_labels(mechanism, name))
     table = np.array([columns[row] for row in labels], np.int64).T
     text = "Return OUTPUTS and their derivatives, k = 0, 1, ..., in SI units"
-    return Function("outputs", (inputs.t, inputs.q, inputs.velocities(lost)), table, ("order", "output"), text), labels
+    return Function("outputs", (inputs.t, inputs.q, inputs.velocities(extra)), table, ("order", "output"), text), labels
 
 
 def _output_labels(mechanism: Mechanism, name: str) -> list[str]:

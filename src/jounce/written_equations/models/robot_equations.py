@@ -71,8 +71,8 @@ def robot_code(robot: Robot, order: int, quantities: Sequence[str], *, drives: b
             functions += [_energy(reading, p, drives=drives) for p in range(order)]
     except UnwritableOperationError as error:
         raise RobotError(f"cannot be written out: {error}", name="robot", value=robot.name) from None
-    about = tuple(" ".join(text.split()) for text in (*(_ABOUT[x] for x in quantities), _PLACE, "SI units."))
-    return Code(robot.name, "equations of motion", reading.graph, order, labels, about, tuple(functions), values)
+    notes = tuple(" ".join(text.split()) for text in (*(_ABOUT[x] for x in quantities), _PLACE, "SI units."))
+    return Code(robot.name, "equations of motion", reading.graph, order, labels, notes, tuple(functions), values)
 
 
 class _Reading:
@@ -128,8 +128,8 @@ def _energy(reading: _Reading, p: int, *, drives: bool) -> Function:
     robot = reading.robot
     static = (p, body_energy, *rotors_of(robot, drives=drives))
     rates = reading.read(lambda q: sum(x.sum(axis=1) for x in energies_of_tree.function(robot.tree, (q,), (), *static)))
-    what = "kinetic energy" if p == 0 else f"acceleration energy of order {p}"
-    return Function(f"energy_{p}", (reading.argument(p + 2),), rates, ("order",), f"Return the {what} and its rates")
+    title = "kinetic energy" if p == 0 else f"acceleration energy of order {p}"
+    return Function(f"energy_{p}", (reading.argument(p + 2),), rates, ("order",), f"Return the {title} and its rates")
 
 
 def _regressor(reading: _Reading, *, drives: bool) -> tuple[Function, dict[str, float]]:
@@ -195,9 +195,9 @@ def _parameters(robot: Robot, *, drives: bool) -> tuple[list[dict[str, Any]], di
 
 def _unit(i: int, j: int) -> Float[np.ndarray, "3 3"]:
     """Return the symmetric matrix with ones at a place and at its mirror image."""
-    whole = np.zeros((3, 3))
-    whole[i, j] = whole[j, i] = 1.0
-    return whole
+    tensor = np.zeros((3, 3))
+    tensor[i, j] = tensor[j, i] = 1.0
+    return tensor
 
 
 def _about_origin(center: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:

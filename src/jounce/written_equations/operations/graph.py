@@ -145,24 +145,24 @@ class Graph:
 
     def total(self, numbers: Iterable[int]) -> int:
         """Return the node of the sum of nodes, zero without nodes."""
-        whole = list(numbers)
-        if not whole:
+        pending = list(numbers)
+        if not pending:
             return self.constant(0.0)
-        result = whole[0]
-        for number in whole[1:]:
+        result = pending[0]
+        for number in pending[1:]:
             result = self.apply("add", result, number)
         return result
 
     def reached(self, roots: Iterable[int]) -> list[int]:
         """Return all nodes that roots need, with the roots, operands first."""
-        seen: set[int] = set()
-        waiting = list(roots)
-        while waiting:
-            number = waiting.pop()
-            if number not in seen:
-                seen.add(number)
-                waiting += self.nodes[number].operands
-        return sorted(seen)
+        visited: set[int] = set()
+        pending = list(roots)
+        while pending:
+            number = pending.pop()
+            if number not in visited:
+                visited.add(number)
+                pending += self.nodes[number].operands
+        return sorted(visited)
 
     def _node(self, node: Node, key: Any = None) -> int:
         key = node if key is None else key
@@ -190,12 +190,12 @@ class Graph:
             return a if self.nodes[a].kind == {"real": REAL, "whole": WHOLE}[name] else None
         if name == "neg":
             return self.nodes[a].operands[0] if self.nodes[a].operation == "neg" else None
-        same = (
+        operand = (
             (name == "div" and (self._is(b, 1) or (self._is(a, 0) and not self._is(b, 0))))
             or (name == "pow" and self._is(b, 1))
             or (name in ("max", "min") and a == b)
         )
-        return a if same else None
+        return a if operand else None
 
     def _sum(self, name: str, a: int, b: int) -> int | None:
         if name == "add":
@@ -221,8 +221,8 @@ class Graph:
                 return y
             if self._is(x, -1):
                 return self.apply("neg", y)
-            if self._is_factor(x) and (rest := self._scaled(y)):
-                return self.apply("mul", self.constant(self.value(x) * rest[0]), rest[1])
+            if self._is_factor(x) and (scaled := self._scaled(y)):
+                return self.apply("mul", self.constant(self.value(x) * scaled[0]), scaled[1])
         for x, y in ((a, b), (b, a)):
             if self.nodes[x].operation == "neg":
                 return self.apply("neg", self.apply("mul", self.nodes[x].operands[0], y))

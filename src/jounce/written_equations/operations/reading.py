@@ -131,8 +131,8 @@ class GraphReader(ProgramReader):
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
         """Return the results of an operation on values."""
         name, parameters = equation.primitive.name, equation.params
-        made: list[Any] = [v.aval for v in equation.outvars]
-        dtypes = [aval.dtype for aval in made]
+        avals: list[Any] = [v.aval for v in equation.outvars]
+        dtypes = [aval.dtype for aval in avals]
         if name in _UNCHANGED:
             return operands[: len(dtypes)]
         if name in _COMPOSED:
@@ -189,13 +189,13 @@ class GraphReader(ProgramReader):
 
         return away
 
-    def _selected(self, which: int, *cases: int) -> int:
+    def _selected(self, choice: int, *cases: int) -> int:
         selected = cases[-1]
-        if self.graph.nodes[which].kind == TRUTH:
-            return self.graph.apply("where", which, cases[1], cases[0])
+        if self.graph.nodes[choice].kind == TRUTH:
+            return self.graph.apply("where", choice, cases[1], cases[0])
         for k in reversed(range(len(cases) - 1)):
             selected = self.graph.apply(
-                "where", self.graph.apply("eq", which, self.graph.constant(k)), cases[k], selected
+                "where", self.graph.apply("eq", choice, self.graph.constant(k)), cases[k], selected
             )
         return selected
 
@@ -219,17 +219,17 @@ class GraphReader(ProgramReader):
             sums.append(self._each(given.dtype, lambda a, b: self.graph.apply("add", a, b), *(
                 Entries(x, given.dtype) for x in (sums[-1], rows[k : k + 1])
             )).numbers)  # fmt: skip
-        whole = np.concatenate(sums[::-1] if reverse else sums)
-        return Entries(np.moveaxis(whole, 0, axis), given.dtype)
+        totals = np.concatenate(sums[::-1] if reverse else sums)
+        return Entries(np.moveaxis(totals, 0, axis), given.dtype)
 
     def _updated(self, given: list[Entries]) -> Entries:
         target, part, *starts = given
         if not self.graph.is_constant(*(int(s.numbers) for s in starts)):
             raise UnwritableOperationError("it replaces an entry of an array at an index that changes")
-        begins = [self.graph.value(int(s.numbers)) for s in starts]
-        begins = [min(max(b, 0), n - m) for b, n, m in zip(begins, target.shape, part.shape, strict=True)]
+        offsets = [self.graph.value(int(s.numbers)) for s in starts]
+        offsets = [min(max(b, 0), n - m) for b, n, m in zip(offsets, target.shape, part.shape, strict=True)]
         numbers = target.numbers.copy()
-        numbers[tuple(slice(b, b + m) for b, m in zip(begins, part.shape, strict=True))] = part.numbers
+        numbers[tuple(slice(b, b + m) for b, m in zip(offsets, part.shape, strict=True))] = part.numbers
         return Entries(numbers, target.dtype)
 
     def _scatter_entries(self, equation: JaxprEqn, given: list[Entries]) -> Entries:
@@ -237,13 +237,13 @@ class GraphReader(ProgramReader):
         target, indices, parts = given
         if not self.graph.is_constant(*indices.numbers.ravel().tolist()):
             raise UnwritableOperationError("it writes at an index that changes")
-        known = np.array([self.graph.value(n) for n in indices.numbers.ravel().tolist()], indices.dtype)
-        known = jnp.asarray(known.reshape(indices.shape))
+        values = np.array([self.graph.value(n) for n in indices.numbers.ravel().tolist()], indices.dtype)
+        values = jnp.asarray(values.reshape(indices.shape))
 
         def added(updates: Any) -> Any:
-            words = ("dimension_numbers", "indices_are_sorted", "unique_indices", "mode")
-            options = {word: equation.params[word] for word in words}
-            return jax.lax.scatter_add(jnp.zeros(target.shape), known, updates, **options)
+            names = ("dimension_numbers", "indices_are_sorted", "unique_indices", "mode")
+            options = {word: equation.params[word] for word in names}
+            return jax.lax.scatter_add(jnp.zeros(target.shape), values, updates, **options)
 
         # the transpose gives each update the number of the place to which it is added, 0 for none
         numbered = jnp.arange(1.0, target.numbers.size + 1).reshape(target.shape)
@@ -262,17 +262,17 @@ class GraphReader(ProgramReader):
         indices = {"gather": given[1:2], "dynamic_slice": given[1:]}.get(name, [])
         if not self.graph.is_constant(*(int(n) for x in indices for n in x.numbers.ravel())):
             return [self._looked_up(equation, operands[0], indices, dtypes[0])]
-        known = [np.array([self.graph.value(int(n)) for n in x.numbers.ravel()]).reshape(x.shape) for x in indices]
-        known = [np.asarray(x, i.dtype) for x, i in zip(known, indices, strict=True)]
+        values = [np.array([self.graph.value(int(n)) for n in x.numbers.ravel()]).reshape(x.shape) for x in indices]
+        values = [np.asarray(x, i.dtype) for x, i in zip(values, indices, strict=True)]
         positions = [x.numbers for x in given[: len(given) - len(indices)]]
         if name in _BY_NUMPY:
             return [Entries(_BY_NUMPY[name](*positions, **equation.params), dtypes[0])]
         filled = {"fill_value": 0} if name == "gather" else {}  # beyond the ends: the number of no operation
-        results = equation.primitive.bind(*map(jnp.asarray, [*positions, *known]), **(equation.params | filled))
+        results = equation.primitive.bind(*map(jnp.asarray, [*positions, *values]), **(equation.params | filled))
         results = [np.asarray(x) for x in (results if equation.primitive.multiple_results else [results])]
         if name == "gather" and (results[0] == 0).any():
-            beyond = self.graph.constant(np.full((), np.nan, dtypes[0]).item() if dtypes[0].kind == "f" else 0)
-            results = [np.where(results[0] == 0, beyond, results[0])]
+            fill_value = self.graph.constant(np.full((), np.nan, dtypes[0]).item() if dtypes[0].kind == "f" else 0)
+            results = [np.where(results[0] == 0, fill_value, results[0])]
         return [Entries(x, dtype) for x, dtype in zip(results, dtypes, strict=True)]
 
     def _looked_up(self, equation: JaxprEqn, table: Any, indices: list[Entries], dtype: Any) -> Entries:
@@ -317,9 +317,9 @@ class GraphReader(ProgramReader):
         """Return the indices by which each result is looked up."""
         owners = np.empty(shape, object)
         if equation.primitive.name == "dynamic_slice":
-            every = [int(x.numbers) for x in indices]
+            numbers = [int(x.numbers) for x in indices]
             for place in np.ndindex(*shape):
-                owners[place] = every
+                owners[place] = numbers
             return owners
         rows = indices[0].numbers
         offsets = equation.params["dimension_numbers"].offset_dims

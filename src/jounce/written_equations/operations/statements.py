@@ -30,12 +30,12 @@ class Names:
     def of(self, label: str) -> str:
         """Return the name of a label."""
         if label not in self._known:
-            plain = re.sub(r"[^0-9a-zA-Z]+", "_", label.encode("ascii", "replace").decode()).strip("_") or "x"
-            plain = f"b_{plain}" if plain[0].isdigit() or re.fullmatch(r"[sk]\d+|table\d+", plain) else plain
-            name, count = plain, 1
+            stem = re.sub(r"[^0-9a-zA-Z]+", "_", label.encode("ascii", "replace").decode()).strip("_") or "x"
+            stem = f"b_{stem}" if stem[0].isdigit() or re.fullmatch(r"[sk]\d+|table\d+", stem) else stem
+            name, count = stem, 1
             while name in self._taken:
                 count += 1
-                name = f"{plain}_{count}"
+                name = f"{stem}_{count}"
             self._taken.add(name)
             self._known[label] = name
         return self._known[label]
@@ -159,5 +159,5 @@ def wrapped(texts: Sequence[str], width: int = 110, indent: str = "    ") -> lis
 
 def one_line(text: str) -> str:
     """Return a title or a label for a comment: ASCII, in one line, without the end of a comment."""
-    plain = " ".join((text or "A mechanism").encode("ascii", "replace").decode().split())
-    return plain.replace("*/", "* /").replace("/*", "/ *").rstrip(".")
+    ascii_text = " ".join((text or "A mechanism").encode("ascii", "replace").decode().split())
+    return ascii_text.replace("*/", "* /").replace("/*", "/ *").rstrip(".")

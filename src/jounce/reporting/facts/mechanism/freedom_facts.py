@@ -101,13 +101,13 @@ class StartingState:
 
     def mobility(self) -> dict[str, Any] | None:
         """Return the mobility with drivers released; None if the mechanism cannot be assembled."""
-        rolling = any(joint.nonholonomic for joint in self.mechanism.joints.values())  # motions depend on rates
-        if self.coordinates is None or self.here is None or rolling:
+        is_rolling = any(joint.nonholonomic for joint in self.mechanism.joints.values())  # motions depend on rates
+        if self.coordinates is None or self.here is None or is_rolling:
             return None
         joints = self.here.take(np.array([name.startswith("joints.") for name in self.model.rows], bool))
         equations, columns = joints.shape
-        whole = joints.rank == equations
-        return _facts_of(independent(columns, equations) if whole else mobility(self.mechanism, self.instant))
+        are_independent = joints.rank == equations
+        return _facts_of(independent(columns, equations) if are_independent else mobility(self.mechanism, self.instant))
 
     def _assembled(self) -> tuple[dict[str, Any] | None, dict[str, Any]]:
         facts = {"status": "assembled", "message": None, "at": self.instant, "open": None}

@@ -103,9 +103,9 @@ def train_facts(state: StartingState) -> list[dict[str, Any]]:
     scale = np.asarray(model.system.column_scale)
     for body, axes in meshing.items():
         for name in turning:
-            right = np.zeros(len(model.rows))
-            right[model.rows.index(f"drivers.{name}")] = -1.0
-            step = here.step(right)
+            rhs = np.zeros(len(model.rows))
+            rhs[model.rows.index(f"drivers.{name}")] = -1.0
+            step = here.step(rhs)
             if step is None:
                 continue
             turns = (step.reshape(-1, len(scale)) * scale)[:, model.pose_type.shifts :]
@@ -143,8 +143,8 @@ def _seen_from(state: StartingState, bodies: Sequence[str], slot: int, axis: Any
     if state.coordinates is None:
         return axis
     shaft, frame = (np.asarray(state.coordinates["quaternion"])[:, [index.index(bodies[k])], 0] for k in (slot, 2))
-    back = frame * np.array([[1.0], [-1.0], [-1.0], [-1.0]])
-    return turned(back, turned(shaft, axis[:, None]))[:, 0]
+    inverse = frame * np.array([[1.0], [-1.0], [-1.0], [-1.0]])
+    return turned(inverse, turned(shaft, axis[:, None]))[:, 0]
 
 
 def _unit_vector(given: Any) -> Any:

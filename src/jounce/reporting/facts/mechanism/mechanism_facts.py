@@ -244,11 +244,11 @@ def parameter_facts(mechanism: Mechanism, path: str | PathLike[str] | None) -> l
     given = read_source(path).data.get("parameters") or {} if path is not None else mechanism.parameters
     values, rows = mechanism.parameter_values, {}
     for name, value in values.items():
-        written, uses = given.get(name), mechanism.dimensions.get(name, ())
-        text = written if isinstance(written, str) else getattr(written, "text", None)
+        formula, uses = given.get(name), mechanism.dimensions.get(name, ())
+        text = formula if isinstance(formula, str) else getattr(formula, "text", None)
         dimension = uses[0] if len(uses) == 1 else None  # from the use of the parameter
         try:
-            quantity = parse_value(written, "any", mechanism.parameters)
+            quantity = parse_value(formula, "any", mechanism.parameters)
         except JounceError:
             pass
         else:
@@ -270,9 +270,9 @@ def unit_of_dimension(dimension: Dimension) -> str:
     """
     order = list(BASES)
     powers = sorted(dimension, key=lambda x: order.index(x[0]) if x[0] in order else 99)
-    over = [_power(base, power) for base, power in powers if power > 0]
-    under = [_power(base, -power) for base, power in powers if power < 0]
-    return "*".join(over or ["1"] * bool(under)) + "".join(f"/{unit}" for unit in under)
+    numerator = [_power(base, power) for base, power in powers if power > 0]
+    denominator = [_power(base, -power) for base, power in powers if power < 0]
+    return "*".join(numerator or ["1"] * bool(denominator)) + "".join(f"/{unit}" for unit in denominator)
 
 
 def _power(base: str, power: int | Fraction) -> str:
@@ -302,8 +302,8 @@ def _bodies(mechanism: Mechanism, model: Model, coordinates: dict[str, Any] | No
 
 def _pose(coordinates: dict[str, Any], k: int, attitude: str) -> dict[str, Any]:
     pose = {"position": np.asarray(coordinates["position"])[:, k, 0].tolist()}
-    turned = np.asarray(coordinates[attitude])[..., k, 0]
-    return pose | {attitude: turned.tolist() if attitude == "quaternion" else float(turned)}
+    rotation = np.asarray(coordinates[attitude])[..., k, 0]
+    return pose | {attitude: rotation.tolist() if attitude == "quaternion" else float(rotation)}
 
 
 def _moved(guess: dict[str, Any], pose: dict[str, Any], attitude: str) -> dict[str, float]:
@@ -346,8 +346,8 @@ def _law_words(law: Any) -> str:
 
 def _output(name: str, output: Any) -> dict[str, Any]:
     form = form_of(output)
-    words, holder = [word for word, kind in OUTPUTS if kind is form], output_holder(form)
-    own = list(output.bodies) if form.body_count and not isinstance(output, ParameterOutput) else []  # or a carriage
-    of = own or [getattr(output, holder, holder)]  # an energy may be that of the mechanism
-    quantity = (words[-1] if words else type(output).__name__) or "point"
-    return {"name": name, "quantity": quantity, "unit": output.unit, "of": of}
+    names, holder = [word for word, kind in OUTPUTS if kind is form], output_holder(form)
+    bodies = list(output.bodies) if form.body_count and not isinstance(output, ParameterOutput) else []  # or a carriage
+    holders = bodies or [getattr(output, holder, holder)]  # an energy may be that of the mechanism
+    quantity = (names[-1] if names else type(output).__name__) or "point"
+    return {"name": name, "quantity": quantity, "unit": output.unit, "of": holders}

@@ -59,29 +59,29 @@ def range_facts(mechanism: Mechanism, driver: str | None = None) -> dict[str, An
     if curve.driver is None:
         return None
     low, high = curve.range
-    whole = not math.isfinite(low)
+    is_unlimited = not math.isfinite(low)
     linkage = recognized(mechanism, curve.driver)
     transmission = None
     if linkage is not None:
         (least, least_at), (most, most_at) = extremes(linkage, low, high)
         transmission = {"smallest": least, "smallest_at": least_at, "largest": most, "largest_at": most_at}
     sizes, values = _on_branch(curve)
-    worst = int(np.argmin(sizes))
+    index = int(np.argmin(sizes))
     facts = {
         "driver": curve.driver,
         "unit": curve.unit,
-        "low": None if whole else low,
-        "high": None if whole else high,
+        "low": None if is_unlimited else low,
+        "high": None if is_unlimited else high,
         "low_is_dead_point": _is_limit(curve, low),
         "high_is_dead_point": _is_limit(curve, high),
         "circuit_closed": curve.closed,
         "type": None if linkage is None else linkage.type,
         "transmission": transmission,
-        "smallest_singular_value": float(sizes[worst]),
-        "smallest_singular_value_at": float(values[worst]),
+        "smallest_singular_value": float(sizes[index]),
+        "smallest_singular_value_at": float(values[index]),
         "change_points": [curve.value(point.arc_length) for point in curve.change_points],
     }
-    return facts | {"warnings": _warnings(facts, whole, float(np.median(sizes)))}
+    return facts | {"warnings": _warnings(facts, is_unlimited, float(np.median(sizes)))}
 
 
 def _is_limit(curve: Curve, value: float) -> bool:
@@ -98,24 +98,24 @@ def _on_branch(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     return curve.smallest_singular_values[inside], curve.values[inside, 0]
 
 
-def _warnings(facts: Facts, whole: bool, median: float) -> list[str]:
+def _warnings(facts: Facts, is_unlimited: bool, median: float) -> list[str]:
     messages = []
     unit = facts["unit"]
     if (transmission := facts["transmission"]) is not None and transmission["smallest"] < POOR_ANGLE:
-        where = value_words(transmission["smallest_at"], unit)
+        place = value_words(transmission["smallest_at"], unit)
         angle = f"{math.degrees(transmission['smallest']):.3g} deg"
         messages.append(
-            f"poor transmission: the transmission angle goes down to {angle}, at {facts['driver']} = {where}"
+            f"poor transmission: the transmission angle goes down to {angle}, at {facts['driver']} = {place}"
         )
-    elif facts["transmission"] is None and whole and facts["smallest_singular_value"] < POOR_SHARE * median:
-        where = value_words(facts["smallest_singular_value_at"], unit)
-        messages.append(f"poor transmission: close to a singular position at {facts['driver']} = {where}")
+    elif facts["transmission"] is None and is_unlimited and facts["smallest_singular_value"] < POOR_SHARE * median:
+        place = value_words(facts["smallest_singular_value_at"], unit)
+        messages.append(f"poor transmission: close to a singular position at {facts['driver']} = {place}")
     ends = " and ".join(value_words(facts[end], unit) for end in ("low", "high") if facts[f"{end}_is_dead_point"])
     if ends:
         messages.append(f"{facts['driver']} turns back at dead points: {ends}; keep its law well inside")
     if facts["change_points"]:
-        where = ", ".join(value_words(value, unit) for value in facts["change_points"])
-        messages.append(f"branches cross at change points: {facts['driver']} = {where}")
+        place = ", ".join(value_words(value, unit) for value in facts["change_points"])
+        messages.append(f"branches cross at change points: {facts['driver']} = {place}")
     return messages
 
 
@@ -135,8 +135,8 @@ def range_words(facts: Facts) -> str:
     if facts["type"]:
         lines.append(f"  {facts['type']}")
     if (transmission := facts["transmission"]) is not None:
-        least, most = (math.degrees(transmission[end]) for end in ("smallest", "largest"))
-        lines.append(f"  transmission angle from {least:.6g} deg to {most:.6g} deg")
+        least, largest = (math.degrees(transmission[end]) for end in ("smallest", "largest"))
+        lines.append(f"  transmission angle from {least:.6g} deg to {largest:.6g} deg")
     smallest = value_words(facts["smallest_singular_value_at"], unit)
     lines.append(f"  smallest singular value {facts['smallest_singular_value']:.3g}, at {driver} = {smallest}")
     return "\n".join([*lines, *(f"  warning: {warning}" for warning in facts["warnings"])])
