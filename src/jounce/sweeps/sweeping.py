@@ -319,10 +319,10 @@ def _title(mechanism: Mechanism) -> str:
     return getattr(mechanism, "title", "") or "designs of a mechanism"
 
 
-def _chunk(given: int | None, existing: Store | None, count: int, quantities: Sequence[Quantity], rows: int) -> int:
+def _chunk(size: int | None, existing: Store | None, count: int, quantities: Sequence[Quantity], rows: int) -> int:
     """Return the number of designs of a chunk: the given one, that of a begun sweep, or by the size of results."""
-    if given is not None:
-        return whole_number("chunk", given, 1, LARGEST_CHUNK, error=MechanismError)
+    if size is not None:
+        return whole_number("chunk", size, 1, LARGEST_CHUNK, error=MechanismError)
     if existing is not None:
         return existing.manifest["options"]["chunk"]
     numbers = rows * sum(math.prod(quantity.shape) for quantity in quantities)

@@ -158,13 +158,13 @@ class _Formula(Module):
 
 
 def resolve_curve(
-    given: Any, names: tuple[str, ...], components: int, start: Any, parameters: Mapping[str, Any]
+    curve: Any, names: tuple[str, ...], components: int, start: Any, parameters: Mapping[str, Any]
 ) -> CurveLaw:
     """Return the curve or surface of a list of expressions or a curve, checked unless values are traced.
 
     Parameters
     ----------
-    given : ParametricCurve, SampledCurve or sequence
+    curve : ParametricCurve, SampledCurve or sequence
         Curve as a user gives it.
     names : tuple of str
         Names of its parameters: ``("s",)`` for a curve, ``("u", "v")`` for a surface.
@@ -180,27 +180,27 @@ def resolve_curve(
     MechanismError
         If it is neither, or is not smooth: a corner, a gap or a cusp, with its location.
     """
-    if isinstance(given, SampledCurve):
-        return _through_points(given, names, components)
-    if not isinstance(given, ParametricCurve):
-        given = ParametricCurve(given)
-    if len(given.expressions) != components:
+    if isinstance(curve, SampledCurve):
+        return _through_points(curve, names, components)
+    if not isinstance(curve, ParametricCurve):
+        curve = ParametricCurve(curve)
+    if len(curve.expressions) != components:
         raise MechanismError(
-            f"must be {components} expressions, one for each coordinate", value=list(given.expressions)
+            f"must be {components} expressions, one for each coordinate", value=list(curve.expressions)
         )
-    if given.closed and len(names) > 1:
+    if curve.closed and len(names) > 1:
         raise MechanismError("a surface is not closed; it goes on as far as its expressions do", name="closed")
-    formulas = tuple(_formula(entry, names, parameters) for entry in given.expressions)
-    ends = None if given.range is None else _range(given.range, len(names), parameters)
+    formulas = tuple(_formula(entry, names, parameters) for entry in curve.expressions)
+    ends = None if curve.range is None else _range(curve.range, len(names), parameters)
     if ends is None and (noun := refuses_without_ends(formulas)):
         message = f"{noun} may have kinks or ends; give the range of {' and '.join(names)} in which the curve is smooth"
         raise MechanismError(message, name="range")
     traced = any(isinstance(x, Tracer) for x in (*parameters.values(), *(ends or ())))
     window = ends or tuple(x + sign * HALF_WINDOW for x in _near(start, len(names)) for sign in (-1, 1))
     if not traced:
-        _checked(formulas, tuple(map(float, window)), bool(ends), given.closed, len(names))
-    lap = ends[1] - ends[0] if given.closed and ends else None
-    return CurveLaw(formulas, None if given.closed else ends, _unit(formulas, window), lap)
+        _checked(formulas, tuple(map(float, window)), bool(ends), curve.closed, len(names))
+    lap = ends[1] - ends[0] if curve.closed and ends else None
+    return CurveLaw(formulas, None if curve.closed else ends, _unit(formulas, window), lap)
 
 
 def _near(start: Any, count: int) -> Float[np.ndarray, " parameter"]:

@@ -40,11 +40,11 @@ class Arguments:
         operands = [self.constant(operand) for operand in node.parts]
         return None if None in operands else float(operated(node.word, operands))
 
-    def argument(self, node: Node, what: str) -> float:
+    def argument(self, node: Node, role: str) -> float:
         """Return the value of an argument, which must be the same in all designs."""
         value = self.constant(node)
         if value is None:
-            message = f"{what} '{node.text}' must be a number that is the same in all designs"
+            message = f"{role} '{node.text}' must be a number that is the same in all designs"
             raise ExpressionError(message)
         return value
 
@@ -66,11 +66,11 @@ class Arguments:
         self.instants.append(instant)
         return instant
 
-    def window(self, rest: Sequence[Node]) -> tuple[float | None, float | None]:
+    def window(self, arguments: Sequence[Node]) -> tuple[float | None, float | None]:
         """Return the window of time of a measure, s, from two arguments after the derivative."""
-        if len(rest) < 3:
+        if len(arguments) < 3:
             return None, None
-        start, stop = self.instant(rest[1]), self.instant(rest[2])
+        start, stop = self.instant(arguments[1]), self.instant(arguments[2])
         if not start < stop:
             raise ExpressionError(f"the window must end after it begins, got {start:g} to {stop:g} s")
         return start, stop

@@ -119,7 +119,7 @@ def optimize(
     if not (isinstance(clearance, numbers.Real) and 0 <= clearance < math.inf):
         raise MechanismError("must be a number, zero or greater", name="clearance", value=clearance)
     instants = _instants(mechanism, time, bounds)
-    targets = {name: _curve(name, given) for name, given in (curves or {}).items()}
+    targets = {name: _curve(name, points) for name, points in (curves or {}).items()}
     if isinstance(subject_to, str):
         raise MechanismError("must be a list of conditions", name="subject_to", value=subject_to)
     request = DesignRequest(minimize, tuple(subject_to), bounds, targets, instants)
@@ -155,28 +155,28 @@ def _bounds(mechanism: Mechanism, vary: Mapping[str, Any]) -> dict[str, tuple[fl
     if not isinstance(vary, Mapping) or not vary:
         raise MechanismError("a design differs in at least one parameter", name="vary", value=vary)
     bounds = {}
-    for name, given in vary.items():
+    for name, pair in vary.items():
         check_name("parameter", name, mechanism.parameters, MechanismError, name="vary")
         try:
-            low, high = (_bound(mechanism, name, x) for x in (given.split(":") if isinstance(given, str) else given))
+            low, high = (_bound(mechanism, name, x) for x in (pair.split(":") if isinstance(pair, str) else pair))
         except (TypeError, ValueError):
-            raise MechanismError("must be a lower and an upper bound", name=f"vary.{name}", value=given) from None
+            raise MechanismError("must be a lower and an upper bound", name=f"vary.{name}", value=pair) from None
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             message = "bounds must be two finite numbers, the lower one first"
-            raise MechanismError(message, name=f"vary.{name}", value=given)
+            raise MechanismError(message, name=f"vary.{name}", value=pair)
         bounds[name] = low, high
     return bounds
 
 
-def _bound(mechanism: Mechanism, name: str, given: Any) -> float:
+def _bound(mechanism: Mechanism, name: str, entry: Any) -> float:
     """Return a bound of a parameter, a value that must be admissible for the mechanism."""
     try:
-        changed = mechanism.with_parameters(**{name: given})
+        changed = mechanism.with_parameters(**{name: entry})
         value = float(changed.parameter_values[name])
         build(with_output_drivers(changed))
     except JounceError as error:
         message = f"no mechanism can have this bound: {error}"
-        raise type(error)(message, name=f"vary.{name}", value=UNSET if error.value == given else given) from None
+        raise type(error)(message, name=f"vary.{name}", value=UNSET if error.value == entry else entry) from None
     return value
 
 
@@ -184,29 +184,29 @@ def _instants(
     mechanism: Mechanism, time: TimeLike | None, bounds: Mapping[str, tuple[float, float]]
 ) -> Float[np.ndarray, " time"]:
     """Return the instants, which must be the same in all designs."""
-    given = mechanism.time if time is None else time
-    instants = time_grid(given, mechanism.parameter_values)
+    grid = mechanism.time if time is None else time
+    instants = time_grid(grid, mechanism.parameter_values)
     for name, pair in bounds.items():
         for bound in pair:
-            varied = time_grid(given, mechanism.with_parameters(**{name: bound}).parameter_values)
+            varied = time_grid(grid, mechanism.with_parameters(**{name: bound}).parameter_values)
             if varied.shape != instants.shape or (varied != instants).any():
                 message = "the instants depend on this parameter, and must be the same in all designs; give time"
                 raise MechanismError(message, name=f"vary.{name}", value=pair)
     if len(instants) < 2:
-        raise MechanismError("an optimization needs at least two instants", name="time", value=given)
+        raise MechanismError("an optimization needs at least two instants", name="time", value=grid)
     return instants
 
 
-def _curve(name: str, given: Any) -> PrescribedPath:
+def _curve(name: str, entry: Any) -> PrescribedPath:
     """Return a prescribed path: points, with times if given."""
-    timed = isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1 and np.ndim(given[1]) == 2
+    timed = isinstance(entry, tuple) and len(entry) == 2 and np.ndim(entry[0]) == 1 and np.ndim(entry[1]) == 2
     location, expected = f"curves.{name}", "points, (points, components), or a pair of times and points, all finite"
-    times = seconds(location, given[0], MechanismError, expected) if timed else None
-    points = by_component(location, given[1] if timed else given, MechanismError)
+    times = seconds(location, entry[0], MechanismError, expected) if timed else None
+    points = by_component(location, entry[1] if timed else entry, MechanismError)
     points = real_numbers(location, points, MechanismError, expected)
     is_valid = points.ndim == 2 and len(points) and np.isfinite(points).all()
     if not is_valid or (times is not None and (times.shape != points.shape[:1] or not np.isfinite(times).all())):
-        raise MechanismError(f"must be {expected}", name=location, value=given)
+        raise MechanismError(f"must be {expected}", name=location, value=entry)
     return PrescribedPath(points, times)
 
 

@@ -98,12 +98,12 @@ class Values:
 Variation = Interval | Uniform | Normal | Values
 
 
-def read_variations(given: Any, read: Reader) -> dict[str, Variation]:
+def read_variations(forms: Any, read: Reader) -> dict[str, Variation]:
     """Return the variations of parameters.
 
     Parameters
     ----------
-    given : dict of str to object
+    forms : dict of str to object
         For each parameter, by name: a text of one of the forms, a pair of bounds, bounds and a count, or a list or an
         array of values; numbers SI.
     read : callable
@@ -114,9 +114,9 @@ def read_variations(given: Any, read: Reader) -> dict[str, Variation]:
     JounceError
         If no parameter varies, a form or a value cannot be read, or bounds are reversed.
     """
-    if not isinstance(given, Mapping) or not given:
-        raise MechanismError(f"say what varies, as {FORMS} for each parameter", name="vary", value=given)
-    return {name: _variation(str(name), form, read) for name, form in given.items()}
+    if not isinstance(forms, Mapping) or not forms:
+        raise MechanismError(f"say what varies, as {FORMS} for each parameter", name="vary", value=forms)
+    return {name: _variation(str(name), form, read) for name, form in forms.items()}
 
 
 def named_forms(texts: Iterable[str]) -> dict[str, str]:

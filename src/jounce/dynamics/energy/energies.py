@@ -282,8 +282,8 @@ def energies_of_tree(
     order: int,
     function: EnergyFunction,
     leading: tuple[int, ...],
-    turned: tuple[int, ...],
-    lined: tuple[tuple[int, int], ...],
+    ball_links: tuple[int, ...],
+    tendon_bodies: tuple[tuple[int, int], ...],
 ) -> tuple[Float[Numbers, "levels body batch"], ...]:
     """Return the Taylor coefficients of the energies of all bodies of a robot, rotors included."""
     frames = body_frames(tree, arrays[0]).without_base()
@@ -291,13 +291,13 @@ def energies_of_tree(
     if leading:  # the bodies that coordinates move, in their order
         rate = differentiated(Jet(tuple(arrays[0])), order + 1)
         final = final.at[:, np.array(leading)].add(stacked(rate * rate * (0.5 * jnp.asarray(tree.armature)[:, None])))
-    if turned:  # the links of balls
+    if ball_links:  # the links of balls
         coordinates = Jet(tuple(arrays[0]))
         spin = differentiated(ball_spin(tree, coordinates, coordinates.differentiate()), order)
         rotors = dot(spin, spin) * (0.5 * jnp.asarray(tree.balls.armature)[:, None])
-        final = final.at[:, np.array(turned)].add(stacked(rotors.truncate(len(final) - 1)))
-    if lined:  # the bodies that the first coordinates of tendons move
-        tendons, columns = (np.array(x) for x in zip(*lined, strict=True))
+        final = final.at[:, np.array(ball_links)].add(stacked(rotors.truncate(len(final) - 1)))
+    if tendon_bodies:  # the bodies that the first coordinates of tendons move
+        tendons, columns = (np.array(x) for x in zip(*tendon_bodies, strict=True))
         energy = stacked(tendon_energy(tree, differentiated(Jet(tuple(arrays[0])), order + 1)))
         final = final.at[:, columns].add(energy[: len(final), tendons])
     return *terms, final

@@ -247,8 +247,8 @@ def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np
         return state
     step = ROUNDING / rate  # s, at those velocities
     nearby = start._replace(position=start.position + step * state.velocity, attitude=start.attitude + step * turn_rate)
-    moved = jax.tree.map(np.asarray, _with_row_rates(equations, nearby, time)[0])
-    change = np.concatenate([(moved.velocity - state.velocity) / model.length, moved.spin - state.spin])[..., 0]
+    displaced = jax.tree.map(np.asarray, _with_row_rates(equations, nearby, time)[0])
+    change = np.concatenate([(displaced.velocity - state.velocity) / model.length, displaced.spin - state.spin])[..., 0]
     if np.max(np.abs(change)) <= LARGEST_CHANGE * size:
         return state
     message = (

@@ -25,23 +25,23 @@ class MotionAtState(Motion):
     """A single state of a mechanism, consistent or not, as a motion of one instant; `at_state` builds it."""
 
 
-def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
+def at_state(subject: object, state: object, time: object) -> tuple[Motion, int]:
     """Return a state as a motion of one instant, and the number of its known derivatives."""
-    if not isinstance(given, Motion | Mechanism):
-        raise MechanismError("must be a jn.Motion or a jn.Mechanism", name="motion", value=given)
-    mechanism = dataclasses.replace(given if isinstance(given, Mechanism) else given.mechanism, outputs={})
+    if not isinstance(subject, Motion | Mechanism):
+        raise MechanismError("must be a jn.Motion or a jn.Mechanism", name="motion", value=subject)
+    mechanism = dataclasses.replace(subject if isinstance(subject, Mechanism) else subject.mechanism, outputs={})
     instant = _array("time", time, ())
     model = build(mechanism)
     coordinates = _guessed(model) if state is None else _coordinates(mechanism, model, state)
     order = len(coordinates["position"]) - 1
     check_laws(mechanism, instant[None], order + 1, forces=order > 1)
-    if isinstance(given, Motion):  # revolutions about axes are counted as along the motion
-        system = dataclasses.replace(given.model.system, outputs=())
-        model = dataclasses.replace(given.model, system=system, outputs=())
+    if isinstance(subject, Motion):  # revolutions about axes are counted as along the motion
+        system = dataclasses.replace(subject.model.system, outputs=())
+        model = dataclasses.replace(subject.model, system=system, outputs=())
     else:
         reference = {name: values[0] for name, values in cut(coordinates, 0).items()}
         model, _ = with_reference(model, reference, float(instant))
-    history = given.history if isinstance(given, Motion) else None
+    history = subject.history if isinstance(subject, Motion) else None
     status = np.array([int(Status.OK)])
     return MotionAtState(
         mechanism, model, instant[None], order, (dict(coordinates), ()), status, {}, history=history
@@ -83,28 +83,28 @@ def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinat
     return coordinates
 
 
-def _body_state(location: str, given: object, pose_type: type[Pose]) -> dict[str, Float[np.ndarray, "_ *component"]]:
+def _body_state(location: str, entry: object, pose_type: type[Pose]) -> dict[str, Float[np.ndarray, "_ *component"]]:
     """Return the plain derivatives of the coordinates of one body."""
     spatial = pose_type is SpatialPose
     keys = ("position", "orientation", "angular_velocity") if spatial else ("position", "angle")
-    if not isinstance(given, Mapping):
-        raise MechanismError(f"must be a mapping with {', '.join(keys)}", name=location, value=given)
-    for key in given:
+    if not isinstance(entry, Mapping):
+        raise MechanismError(f"must be a mapping with {', '.join(keys)}", name=location, value=entry)
+    for key in entry:
         check_choice("key", key, keys, MechanismError, name=location)
     for key in keys[:2]:
-        if key not in given:
+        if key not in entry:
             raise MechanismError("is missing", name=f"{location}.{key}")
-    position = _array(f"{location}.position", given["position"], (pose_type.shifts,))
+    position = _array(f"{location}.position", entry["position"], (pose_type.shifts,))
     order = len(position) - 1
     if not spatial:
-        angle = _array(f"{location}.angle", given["angle"], (1,))[:, 0]
+        angle = _array(f"{location}.angle", entry["angle"], (1,))[:, 0]
         _check_order(f"{location}.angle", len(angle) - 1, order)
         return {"position": position, "angle": angle}
     try:
-        quaternion = np.array([euler_parameters(given["orientation"])])
+        quaternion = np.array([euler_parameters(entry["orientation"])])
     except MechanismError as error:
         raise error.located(name=f"{location}.orientation") from None
-    spin = _array(f"{location}.angular_velocity", given.get("angular_velocity", np.zeros((0, 3))), (3,))
+    spin = _array(f"{location}.angular_velocity", entry.get("angular_velocity", np.zeros((0, 3))), (3,))
     _check_order(f"{location}.angular_velocity", len(spin), order)
     return {"position": position, "quaternion": quaternion, "angular_velocity": spin}
 

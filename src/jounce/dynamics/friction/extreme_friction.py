@@ -78,13 +78,13 @@ class ExtremeFriction:
         self.signs_only = len(np.unique(self.joints)) == len(self.joints)
 
     def most(
-        self, along: Float[np.ndarray, "direction lane"]
+        self, contributions: Float[np.ndarray, "direction lane"]
     ) -> tuple[Float[np.ndarray, " lane"], Bool[np.ndarray, " lane"]]:
         """Return the largest contribution of friction to a quantity, and whether it is proven to be the largest.
 
         Parameters
         ----------
-        along : array of shape (directions, instants)
+        contributions : array of shape (directions, instants)
             Contribution of unit friction in each slip direction.
 
         Returns
@@ -93,24 +93,24 @@ class ExtremeFriction:
             Infinite where friction locks and has no bound; NaN where it is not determined.
         proven : array of bool, shape (instants,)
         """
-        along = along[self._given]
-        if not len(along):
-            return np.zeros(along.shape[1]), np.ones(along.shape[1], bool)
-        start = self._directions_of(along, np.ones_like(along))
-        chosen, value, proven = self._improved(start, along)
+        contributions = contributions[self._given]
+        if not len(contributions):
+            return np.zeros(contributions.shape[1]), np.ones(contributions.shape[1], bool)
+        start = self._directions_of(contributions, np.ones_like(contributions))
+        chosen, value, proven = self._improved(start, contributions)
         for lane in np.flatnonzero(~self.pressing.any(axis=(0, 1))):
-            value[lane], proven[lane] = np.inf if self._locks_unloaded(along, int(lane)) else 0.0, True
+            value[lane], proven[lane] = np.inf if self._locks_unloaded(contributions, int(lane)) else 0.0, True
         for lane in np.flatnonzero(~proven):
-            value[lane], proven[lane] = self._searched(int(lane), along[:, lane], chosen[:, lane])
+            value[lane], proven[lane] = self._searched(int(lane), contributions[:, lane], chosen[:, lane])
         return value, proven
 
-    def _locks_unloaded(self, along: np.ndarray, lane: int) -> bool:
+    def _locks_unloaded(self, contributions: np.ndarray, lane: int) -> bool:
         """Return whether friction of unloaded joints locks, as it does under any of several random loads."""
         loads = np.random.default_rng(0).normal(size=(*self.pressing.shape[:2], LOADS))
         loads = np.concatenate([loads, -loads], axis=-1)
         changes = np.repeat(self.changes[..., lane : lane + 1], 2 * LOADS, axis=-1)
         loaded = ExtremeFriction(loads, changes, self.joints, self.coefficients)
-        return bool(np.isinf(loaded.most(np.repeat(along[:, lane : lane + 1], 2 * LOADS, axis=1))[0]).any())
+        return bool(np.isinf(loaded.most(np.repeat(contributions[:, lane : lane + 1], 2 * LOADS, axis=1))[0]).any())
 
     def _blocks(self, values: np.ndarray) -> np.ndarray:
         """Return the sums over the directions of each joint."""
@@ -118,13 +118,13 @@ class ExtremeFriction:
         np.add.at(sums, self.joints, values)
         return sums
 
-    def _directions_of(self, along: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
-        """Return the unit vector of `along` for each joint, or that of `otherwise` where `along` is zero."""
-        size = np.sqrt(self._blocks(along**2))[self.joints]
+    def _directions_of(self, contributions: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+        """Return the unit vector of contributions for each joint, or that of `otherwise` where they are zero."""
+        size = np.sqrt(self._blocks(contributions**2))[self.joints]
         fallback = otherwise / np.sqrt(self._blocks(otherwise**2))[self.joints]
         max_size = size.max(axis=0, initial=0.0)
         clear = size > 1e-14 * max_size
-        return np.where(clear, along / np.where(clear, size, 1.0), fallback)
+        return np.where(clear, contributions / np.where(clear, size, 1.0), fallback)
 
     def _held(self, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the normal forces, their sizes, and the friction, for full friction along given directions."""
@@ -137,21 +137,21 @@ class ExtremeFriction:
         sizes = np.where(sizes <= LOCKED * np.abs(self.pressing).max(axis=(0, 1)), sizes, np.nan)
         return pressing, sizes, full_friction * sizes[self.joints]
 
-    def _improved(self, directions: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _improved(self, directions: np.ndarray, contributions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return improved directions of friction, their contribution, and whether it is proven to be the largest."""
         for _ in range(IMPROVEMENTS):
-            gain, sizes, regular = self._gain(directions, along)
+            gain, sizes, regular = self._gain(directions, contributions)
             improved = np.where(regular, self._directions_of(gain, directions), directions)
             change = np.abs(improved - directions).max(axis=0, initial=0.0)
             if not (change > 1e-14).any():
                 break
             directions = improved
-        gain, sizes, regular = self._gain(directions, along)
+        gain, sizes, regular = self._gain(directions, contributions)
         change = np.abs(self._directions_of(gain, directions) - directions).max(axis=0, initial=0.0)
         proven = regular & (change <= ALONG) & self._is_concave(gain, sizes, regular)
-        return directions, np.sum(along * self._held(directions)[2], axis=0), proven
+        return directions, np.sum(contributions * self._held(directions)[2], axis=0), proven
 
-    def _gain(self, directions: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _gain(self, directions: np.ndarray, contributions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the total derivative of the contribution by the friction in each direction, the normal forces, and
         whether both are regular.
         """
@@ -162,8 +162,8 @@ class ExtremeFriction:
         full_friction = self.coefficients[self.joints][:, None] * directions
         unit = np.eye(len(directions))[..., None]
         matrix = unit - full_friction[:, None] * slopes[self.joints]
-        regular = is_known & np.isfinite(along).all(axis=0) & np.isfinite(matrix).all(axis=(0, 1))
-        matrix, right = np.where(regular, matrix, unit), np.where(regular, along, 0.0)
+        regular = is_known & np.isfinite(contributions).all(axis=0) & np.isfinite(matrix).all(axis=(0, 1))
+        matrix, right = np.where(regular, matrix, unit), np.where(regular, contributions, 0.0)
         return np.linalg.solve(matrix.transpose(2, 1, 0), right.T[..., None])[..., 0].T, sizes, regular
 
     def _is_concave(self, gain: np.ndarray, sizes: np.ndarray, regular: np.ndarray) -> np.ndarray:
@@ -176,9 +176,9 @@ class ExtremeFriction:
         eigenvalue = np.linalg.eigvalsh(np.where(fit[:, None, None], curvature, 0.0)).min(axis=1, initial=0.0)
         return fit & (eigenvalue >= -CONCAVE * weights.max(axis=0, initial=0.0))
 
-    def _searched(self, lane: int, along: np.ndarray, chosen: np.ndarray) -> tuple[float, bool]:
+    def _searched(self, lane: int, contributions: np.ndarray, chosen: np.ndarray) -> tuple[float, bool]:
         """Return the largest contribution at an instant by comparing all signs, or by a search from many directions."""
-        if not np.isfinite(along).all():
+        if not np.isfinite(contributions).all():
             return np.nan, True
         count = len(self.joints)
         is_complete = self.signs_only and count <= ALL_SIGNS
@@ -189,7 +189,7 @@ class ExtremeFriction:
             trials = np.concatenate([chosen[:, None], self._directions_of(random, random)], axis=1)
         lanes = np.full(trials.shape[1], lane)
         repeated = ExtremeFriction(self.pressing[..., lanes], self.changes[..., lanes], self.joints, self.coefficients)
-        wide = np.repeat(along[:, None], len(lanes), axis=1)
+        wide = np.repeat(contributions[:, None], len(lanes), axis=1)
         if not is_complete:
             trials, _, _ = repeated._improved(trials, wide)
         value = np.sum(wide * repeated._held(trials)[2], axis=0)
@@ -200,19 +200,19 @@ class ExtremeFriction:
             return np.inf, True
         return (np.nan, False) if np.isnan(value).any() else (float(value.max()), is_complete)
 
-    def _at_lock(self, directions: np.ndarray, along: np.ndarray) -> np.ndarray:
+    def _at_lock(self, directions: np.ndarray, contributions: np.ndarray) -> np.ndarray:
         """Return the limit of the contribution as friction grows until it locks: infinite with its sign, or NaN."""
-        fraction, locked = np.zeros(along.shape[1]), np.ones(along.shape[1])
-        value = np.zeros(along.shape[1])
+        fraction, locked = np.zeros(contributions.shape[1]), np.ones(contributions.shape[1])
+        value = np.zeros(contributions.shape[1])
         for _ in range(HALVINGS):
             middle = (fraction + locked) / 2
-            contribution = np.sum(along * self._held(directions * middle)[2], axis=0)
-            fit = np.isfinite(contribution)
+            trial = np.sum(contributions * self._held(directions * middle)[2], axis=0)
+            fit = np.isfinite(trial)
             fraction, locked, value = (
                 np.where(fit, middle, fraction),
                 np.where(fit, locked, middle),
-                np.where(fit, contribution, value),
+                np.where(fit, trial, value),
             )
         loads = np.abs(self.pressing).max(axis=(0, 1))
-        size = np.abs(along).max(axis=0) * loads
+        size = np.abs(contributions).max(axis=0) * loads
         return np.where(np.abs(value) > LARGE * size, np.copysign(np.inf, value), np.nan)

@@ -92,7 +92,7 @@ def linearize(
     >>> small.coordinates, (small.modes.angular_frequencies**2 / 9.81).round(12).tolist()  # 2 - sqrt 2, 2 + sqrt 2
     (('upper.angle', 'lower.angle'), [0.585786437627, 3.414213562373])
     """
-    about = None
+    reference = None
     if isinstance(subject, Robot):
         return _of_robot(subject, q, coordinates, flag("drives", drives, error=RobotError))
     if q is not None:
@@ -104,7 +104,7 @@ def linearize(
         raise MechanismError("an equilibrium has its instant already", name="time", value=time)
     if isinstance(subject, Equilibrium):
         required_masses(subject.mechanism, "small motions")
-        about, point = subject, subject.point
+        reference, point = subject, subject.point
     elif isinstance(subject, Motion):
         required_masses(subject.mechanism, "small motions")
         check_no_friction(subject.mechanism, "small motions about a motion, not about an equilibrium,")
@@ -116,11 +116,11 @@ def linearize(
     for name in released:
         check_name("driver", name, point.mechanism.drivers, MechanismError, name="release")
     check_unique_pressing(point.model, point.equations.system)
-    _check_free(point, about, released)
+    _check_free(point, reference, released)
     names = None if coordinates is None else named("coordinates", coordinates)
-    reduction = reduced(point, names, released, prefer_outputs=about is not None and about.of_robot)
+    reduction = reduced(point, names, released, prefer_outputs=reference is not None and reference.of_robot)
     _check(reduction)
-    return Linearization(reduction, about)
+    return Linearization(reduction, reference)
 
 
 def _of_robot(robot: Robot, q: GivenState, coordinates: Sequence[str] | None, drives: bool) -> Linearization:
@@ -183,10 +183,10 @@ def _at(motion: Motion, time: Any) -> tuple[Motion, int]:
     return motion, lane
 
 
-def _check_free(point: OperatingPoint, about: Equilibrium | None, released: Sequence[str]) -> None:
+def _check_free(point: OperatingPoint, reference: Equilibrium | None, released: Sequence[str]) -> None:
     """Raise MobilityError if nothing can move, or more motions are possible than elsewhere."""
-    if about is not None and about.singular:
-        raise MobilityError(f"there are no linear equations of motion: {about.reason}")
+    if reference is not None and reference.singular:
+        raise MobilityError(f"there are no linear equations of motion: {reference.reason}")
     if not point.free.shape[1] and not released:
         drivers = ", ".join(point.mechanism.drivers)
         advice = f"leave a driver out of the equilibrium, or release it ({drivers})" if drivers else "free a joint"

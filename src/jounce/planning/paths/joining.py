@@ -28,12 +28,12 @@ STEADY = "at + rate*(t - begin)"
 State = Float[np.ndarray, "_ joint"]  # position, velocity, ...
 
 
-def clean_state(given: ArrayLike, names: Sequence[str], limits: dict[str, Limits]) -> State:
+def clean_state(raw_state: ArrayLike, names: Sequence[str], limits: dict[str, Limits]) -> State:
     """Return the state of a running robot with values below a billionth of a limit set to zero, and cut to the limits.
 
     Parameters
     ----------
-    given : array_like of shape (derivatives, joints)
+    raw_state : array_like of shape (derivatives, joints)
         Positions and velocities, and if known accelerations and jerks, rad or m and s.
     names : sequence of str
         Names of the joints.
@@ -46,7 +46,7 @@ def clean_state(given: ArrayLike, names: Sequence[str], limits: dict[str, Limits
         If the state is not valid, or has accelerations at rest.
     """
     message = f"must hold positions, velocities and perhaps accelerations and jerks of {len(names)} joints"
-    state = real_numbers("state", in_order("state", given, names, TrajectoryError), TrajectoryError, message).copy()
+    state = real_numbers("state", in_order("state", raw_state, names, TrajectoryError), TrajectoryError, message).copy()
     if state.ndim != 2 or not 2 <= len(state) <= MET or state.shape[1] != len(names):
         raise TrajectoryError(message, name="state", value=f"shape {state.shape}")
     if not np.isfinite(state).all():

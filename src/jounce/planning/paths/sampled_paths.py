@@ -58,9 +58,9 @@ def lines_along(path: Path) -> Lines:
     return dataclasses.replace(lines, own=float(lines.distances(inner, path.derivatives(inner, 0)[:, 0]).max()))
 
 
-def deviation_of(lines: Lines, given: float | None) -> float:
+def deviation_of(lines: Lines, deviation: float | None) -> float:
     """Return the largest allowed distance of a path from samples."""
-    return min(DEVIATION, SHARE * lines.size) if given is None else given
+    return min(DEVIATION, SHARE * lines.size) if deviation is None else deviation
 
 
 def path_of_samples(

@@ -152,7 +152,7 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
 
 
 def stopping(
-    path: Path, at: Float[np.ndarray, " stop"], order: int
+    path: Path, stops: Float[np.ndarray, " stop"], order: int
 ) -> tuple[Path, Callable[[_Parameters], _Parameters]]:
     """Return a path over a parameter with which a motion stops at given places, and the function from s to it.
 
@@ -160,12 +160,12 @@ def stopping(
     ----------
     path : Path
         The path.
-    at : array of shape (stop,)
+    stops : array of shape (stop,)
         Parameters of the stops, increasing, within the path.
     order : int
         Order to which derivatives of the motion vanish at the stops.
     """
-    lengths, total_length = at - path.start, path.stop - path.start
+    lengths, total_length = stops - path.start, path.stop - path.start
     edges = np.concatenate([[0.0], lengths, [total_length]])
     widths = np.minimum(WIDEST * total_length, np.minimum(np.diff(edges)[:-1], np.diff(edges)[1:]) / 2)
     ramps = Ramps(lengths, widths, order + 1)
@@ -176,7 +176,7 @@ def stopping(
     def parameter(s: _Parameters) -> _Parameters:
         return ramps.parameter(np.clip(s - path.start, 0.0, total_length))
 
-    note = f"{path.words}, with {len(at)} stop{'s' * (len(at) > 1)} where the load changes" if path.words else ""
+    note = f"{path.words}, with {len(stops)} stop{'s' * (len(stops) > 1)} where the load changes" if path.words else ""
     instants = path.instants and (parameter(path.instants[0]), path.instants[1])
     slowed = dataclasses.replace(path, laws=laws, start=0.0, stop=float(leader.stop), instants=instants, words=note)
     return dataclasses.replace(slowed, passed=path.passed and (parameter(path.passed[0]), path.passed[1])), parameter

@@ -60,12 +60,12 @@ class TimeSplines:
         """Ends of the intervals, s."""
         return self.knots[self.degree : len(self.knots) - self.degree]
 
-    def matrices(self, at: _Points, order: int) -> Float[np.ndarray, "derivative point spline"]:
+    def matrices(self, times: _Points, order: int) -> Float[np.ndarray, "derivative point spline"]:
         """Return the values of the splines and of their derivatives at instants."""
         from scipy.interpolate import BSpline
 
         splines = BSpline(self.knots, np.eye(self.count), self.degree)
-        return np.stack([splines(at, nu=k) for k in range(order + 1)])
+        return np.stack([splines(times, nu=k) for k in range(order + 1)])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -161,8 +161,8 @@ def retime(
         duration = positive("duration", duration)
     between = Between(deviation, parameter, degree)
     if isinstance(robot, Mechanism):
-        given = {"repair": repair, "path": path is not None, "deviation": deviation is not None}
-        _check_of_robots(given | {"state": state is not None, "loads": len(loads) > 0}, between)
+        arguments = {"repair": repair, "path": path is not None, "deviation": deviation is not None}
+        _check_of_robots(arguments | {"state": state is not None, "loads": len(loads) > 0}, between)
         return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells or CELLS, duration)
     if not isinstance(robot, Robot):
         raise TrajectoryError("must be a Robot or a Mechanism", name="robot", value=type(robot).__name__)
@@ -207,17 +207,17 @@ def _quantities(
     return RobotQuantities(robot, path, limits, drives=drives, loads=loads)
 
 
-def _check_of_robots(given: Mapping[str, bool], between: Between) -> None:
+def _check_of_robots(arguments: Mapping[str, bool], between: Between) -> None:
     """Raise TrajectoryError for arguments that do not apply to a mechanism."""
-    if any(given.values()):
+    if any(arguments.values()):
         message = "the path of a mechanism is that of its drivers, which is not repaired; leave this out"
-        raise TrajectoryError(message, name=next(name for name, x in given.items() if x))
+        raise TrajectoryError(message, name=next(name for name, x in arguments.items() if x))
     between.check_without_points()
 
 
-def _check_not_repaired(**given: Any) -> None:
+def _check_not_repaired(**arguments: Any) -> None:
     """Raise TrajectoryError for arguments that a repaired trajectory determines itself."""
-    for name, value in given.items():
+    for name, value in arguments.items():
         if value is not None:
             message = (
                 "a repaired trajectory has its own times and its own beginning; leave this out, or do not repair it"

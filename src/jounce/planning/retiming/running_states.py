@@ -42,7 +42,7 @@ Planned = Callable[[Path, Conditions, float | None], RetimedTrajectory]
 
 def retimed_from(
     path: Path,
-    given: ArrayLike | None,
+    raw_state: ArrayLike | None,
     conditions: Conditions,
     quantities: Callable[[Path], RobotQuantities],
     planned: Planned,
@@ -53,7 +53,7 @@ def retimed_from(
     ----------
     path : Path
         The path to follow.
-    given : array_like of shape (derivatives, joints), or None
+    raw_state : array_like of shape (derivatives, joints), or None
         State of a running robot; None for a robot at the start of the path, with the rate of the conditions.
     conditions : Conditions
         Conditions of the law along the path.
@@ -67,15 +67,15 @@ def retimed_from(
     TrajectoryError, SolveError
         If the state exceeds a limit, or no motion from it within the limits is found; the message names the limit.
     """
-    if given is None:
+    if raw_state is None:
         return planned(path, conditions, None)
     if any(conditions.rates[:1]):
         message = "the state determines the initial rate; leave the first rate at 0"
         raise TrajectoryError(message, name="rates", value=list(conditions.rates))
     source = quantities(path)
-    state = clean_state(given, path.names, dict(source.limits.joints))
+    state = clean_state(raw_state, path.names, dict(source.limits.joints))
     check_possible(source, source.labels, path.start, path.stop)
-    check_state(source, np.asarray(given, float), ROUNDING)
+    check_state(source, np.asarray(raw_state, float), ROUNDING)
     if largest_ratio(source, state)[0] > 1 - SPARE:  # a limit of a point or of a torque, not of a joint
         state = within_torque_limits(source, state * (1 - 2 * ROUNDING) ** np.arange(len(state))[:, None])
         check_state(source, state, -SPARE)

@@ -281,11 +281,11 @@ class Search:
         )
         raise SolveError(message)
 
-    def with_margin(self, law: RateLaw, over: float) -> RateLaw:
+    def with_margin(self, law: RateLaw, excess: float) -> RateLaw:
         """Return a law with a margin to its limits: slowed as a whole, unless rates are given at the ends."""
         if self.duration is None and not any(self.conditions.rates):
-            return law.slowed(1 + over)
-        self.margin += 1.1 * over
+            return law.slowed(1 + excess)
+        self.margin += 1.1 * excess
         return self.lengthened(self.run(law.coefficients, settled=True), self.duration)
 
     def lengthened(self, law: RateLaw, duration: float | None) -> RateLaw:

@@ -36,13 +36,13 @@ class Samples:
     def __len__(self) -> int:
         return len(self._times)
 
-    def times(self, which: Any) -> Float[np.ndarray, " some"]:
+    def times(self, index: Any) -> Float[np.ndarray, " some"]:
         """Return selected instants."""
-        return np.clip((self._times[which] - self._first) / self.scale, 0.0, self.knots[-1])
+        return np.clip((self._times[index] - self._first) / self.scale, 0.0, self.knots[-1])
 
-    def values(self, which: Any) -> Float[np.ndarray, " some"]:
+    def values(self, index: Any) -> Float[np.ndarray, " some"]:
         """Return selected values minus the mean of all."""
-        return self._values[which] - self.middle
+        return self._values[index] - self.middle
 
     def place(self, instant: float, side: str = "left") -> int:
         """Return the index at which an instant belongs among those of the samples, by bisection."""

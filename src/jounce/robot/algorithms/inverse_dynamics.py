@@ -214,10 +214,10 @@ def _on_bodies(
         if in_scene:
             frame = frames.take(body)
             if scene is not None:
-                force, torque = (total(u * part[i : i + 1] for i, u in enumerate(scene)) for part in (force, torque))
+                force, torque = (total(u * x[i : i + 1] for i, u in enumerate(scene)) for x in (force, torque))
             force, torque = frame.to_body(force), frame.to_body(torque)
         else:
-            force, torque = (matvec(rotation[:, :, None], part) for part in (force, torque))
+            force, torque = (matvec(rotation[:, :, None], x) for x in (force, torque))
         moment = torque + cross(point[:, None], force)
         loads = loads + of_one_body(stacked(concatenate([force, moment])), body, tree.shape.bodies + 1)
     return loads

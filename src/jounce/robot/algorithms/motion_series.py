@@ -43,7 +43,7 @@ def motion_series(
     equations: TreeEquations,
     motion: TreeState,
     applied: Callable[[TreeState, Any], tuple[Unknowns, Wrenches]],
-    given: Series,
+    signals: Series,
     driven: Series,
     order: int,
     *,
@@ -60,8 +60,8 @@ def motion_series(
     motion : TreeState
         State at the expansion point.
     applied : callable
-        Maps a motion and `given` to the forces of the coordinates, those on a free base, and wrenches on bodies.
-    given : pytree of array of shape (order + 1, ..., batch)
+        Maps a motion and `signals` to the forces of the coordinates, those on a free base, and wrenches on bodies.
+    signals : pytree of array of shape (order + 1, ..., batch)
         Series of the inputs of forces other than the motion.
     driven : array of shape (order + 1, coordinates, batch)
         Accelerations of driven coordinates, zero for free ones.
@@ -75,7 +75,7 @@ def motion_series(
         Constant entries of the equations, from `constant_motion`.
     """
     factor = equations.factored(motion)
-    start = jax.tree.map(lambda x: x[0], given)
+    start = jax.tree.map(lambda x: x[0], signals)
     lanes = motion.axes.shape[-1]
     base = None if motion.base is None else jnp.zeros((6, lanes))
     trial = Unknowns(jnp.broadcast_to(driven[0], motion.rates.shape), base)
@@ -92,23 +92,23 @@ def motion_series(
     recursion = Recursion(program, inputs, order, reversible=reversible, unrolled=unrolled, still=still)
 
     def room(first: Any) -> Any:
-        least = 0 if unrolled else LARGE // max(first.size, 1) + 1  # in memory, to write at a place that varies
-        return jnp.zeros((max(order + 1, least), *first.shape)).at[0].set(first)
+        min_length = 0 if unrolled else LARGE // max(first.size, 1) + 1  # in memory, to write at a place that varies
+        return jnp.zeros((max(order + 1, min_length), *first.shape)).at[0].set(first)
 
-    def put(series: Any, newest: Any, k: Any) -> Any:
+    def updated(series: Any, newest: Any, k: Any) -> Any:
         return jax.tree.map(lambda s, c: jax.lax.dynamic_update_index_in_dim(s, c, k, 0), series, newest)
 
     def level(k: Any, carry: Any) -> Any:
-        history, now, accelerations, poses = carry
+        history, coefficients, accelerations, poses = carry
         trial = Unknowns(jnp.broadcast_to(driven[k], motion.rates.shape), base)
-        inputs = jax.tree.leaves((now, trial, jax.tree.map(lambda x: x[k], given)))
+        inputs = jax.tree.leaves((coefficients, trial, jax.tree.map(lambda x: x[k], signals)))
         (gap, rates), newest = recursion.advanced(history, k, inputs)
         change = factor.solve(gap)
         history = recursion.noted(history, k, recursion.corrected(newest, (*before, *jax.tree.leaves(change), *after)))
         newest = jax.tree.map(jnp.add, trial, change)
         rates = _with_accelerations(rates, newest)
-        now = jax.tree.map(lambda x: x / (k + 1), rates)
-        return history, now, put(accelerations, newest, k), put(poses, _poses(rates), k)
+        coefficients = jax.tree.map(lambda x: x / (k + 1), rates)
+        return history, coefficients, updated(accelerations, newest, k), updated(poses, _poses(rates), k)
 
     carry = recursion.history, rates, jax.tree.map(room, solved), jax.tree.map(room, _poses(rates))
     if unrolled:
@@ -142,46 +142,46 @@ def _poses(motion: TreeState) -> Any:
 
 
 def constant_motion(
-    read: Callable[[Any], tuple[TreeEquations, Any]],
+    reader: Callable[[Any], tuple[TreeEquations, Any]],
     parameters: Any,
     motion: TreeState,
     accelerations: Unknowns,
-    given: Series,
+    signals: Series,
 ) -> ConstantEntries:
     """Return the entries that stay constant in the equations of motion of a tree.
 
     Parameters
     ----------
-    read : callable
+    reader : callable
         Maps parameters to the equations and the forces that `motion_series` takes.
     parameters : pytree of array
         Parameters, NaN where unknown beforehand.
-    motion, accelerations, given : pytree of array
+    motion, accelerations, signals : pytree of array
         A state and the other inputs of forces, NaN where unknown.
     """
-    structure = jax.tree.structure((motion, accelerations, given))
+    structure = jax.tree.structure((motion, accelerations, signals))
 
     def program(parameters: Any, *leaves: Any) -> Any:
-        return _program(*read(parameters), structure, *leaves)
+        return _program(*reader(parameters), structure, *leaves)
 
     form, first = jax.tree.structure(motion), len(jax.tree.leaves(accelerations))  # rates follow what is missing
     numbers = jax.tree.unflatten(form, range(first, first + form.num_leaves))
     rates = jax.tree.leaves(_with_accelerations(numbers, jax.tree.map(lambda _: -1, accelerations)))
-    values = jax.tree.leaves((motion, accelerations, given))
+    values = jax.tree.leaves((motion, accelerations, signals))
     return still_entries(program, parameters, values, [*rates, *[-1] * (len(values) - len(rates))])
 
 
 def _missing(
-    equations: TreeEquations, applied: Any, motion: TreeState, accelerations: Unknowns, given: Any
+    equations: TreeEquations, applied: Any, motion: TreeState, accelerations: Unknowns, signals: Any
 ) -> Unknowns:
-    forces, wrenches = applied(motion, given)
+    forces, wrenches = applied(motion, signals)
     return jax.tree.map(jnp.subtract, forces, equations.needed(motion, accelerations, wrenches))
 
 
 def _program(equations: TreeEquations, applied: Any, structure: Any, *leaves: Any) -> Any:
     """Return the force residual and the rates of the motion."""
-    motion, accelerations, given = jax.tree.unflatten(structure, leaves)
-    return _missing(equations, applied, motion, accelerations, given), equations.motion_rates(motion, accelerations)
+    motion, accelerations, signals = jax.tree.unflatten(structure, leaves)
+    return _missing(equations, applied, motion, accelerations, signals), equations.motion_rates(motion, accelerations)
 
 
 def _with_accelerations(rates: TreeState, accelerations: Unknowns) -> TreeState:

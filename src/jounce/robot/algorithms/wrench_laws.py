@@ -31,8 +31,8 @@ class WrenchPart(Module):
         """Return three components at states, the batch last."""
         if self.function is None:
             return jnp.broadcast_to(jnp.asarray(self.constant)[:, None], (3, time.shape[-1]))
-        given = (time, q, rate) if self.of_state else (time,)
-        return self.function(*given)
+        arguments = (time, q, rate) if self.of_state else (time,)
+        return self.function(*arguments)
 
     def at(self, *state: Any) -> Any:
         """Return three components at one state, or at one time, from the function as it was when read."""
@@ -48,11 +48,11 @@ class WrenchLaws(Module):
     @property
     def changing(self) -> bool:
         """Whether a wrench depends on anything but the pose of its link."""
-        return any(part.function is not None for both in self.parts for part in both)
+        return any(part.function is not None for pair in self.parts for part in pair)
 
     def __call__(self, time: Any, q: Any, rate: Any) -> tuple[Any, ...]:
         """Return the force and torque of each wrench, (6, batch)."""
-        return tuple(jnp.concatenate([part(time, q, rate) for part in both]) for both in self.parts)
+        return tuple(jnp.concatenate([part(time, q, rate) for part in pair]) for pair in self.parts)
 
 
 def wrench_laws(
@@ -76,28 +76,28 @@ def wrench_laws(
         function.
     """
     check_wrenches(robot, wrenches, free=free)
-    parts, n = [], len(robot.joint_names)
+    laws, n = [], len(robot.joint_names)
     for k, wrench in enumerate(wrenches):
-        each = ("force", "torque")
-        parts.append(tuple(_part(f"wrenches[{k}].{name}", getattr(wrench, name), n) for name in each))
+        kinds = ("force", "torque")
+        laws.append(tuple(_part(f"wrenches[{k}].{name}", getattr(wrench, name), n) for name in kinds))
     frames = tuple(frame_at(robot, wrench.link, wrench.point) for wrench in wrenches)
-    return WrenchLaws(tuple(parts)), frames, tuple(wrench.frame == "base" for wrench in wrenches)
+    return WrenchLaws(tuple(laws)), frames, tuple(wrench.frame == "base" for wrench in wrenches)
 
 
-def _part(where: str, given: Any, n: int) -> WrenchPart:
-    if not callable(given):
-        value = np.asarray(floats(where, by_component(where, given, RobotError)))
+def _part(location: str, form: Any, n: int) -> WrenchPart:
+    if not callable(form):
+        value = np.asarray(floats(location, by_component(location, form, RobotError)))
         if value.shape != (3,) or not np.isfinite(value).all():
             message = "must be three finite numbers, or a function of time, or of time, q and rates"
-            raise RobotError(message, name=where, value=value.tolist())
+            raise RobotError(message, name=location, value=value.tolist())
         return WrenchPart(value, None, False)
-    of_state = len(inspect.signature(given).parameters) == STATE
+    of_state = len(inspect.signature(form).parameters) == STATE
     state = (jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)) if of_state else (jnp.zeros(()),)
     try:
-        sampled = SampleFunction.of(given, *state)
+        sampled = SampleFunction.of(form, *state)
     except TypeError as error:
         message = f"must be a function of time, or of time, q and rates, by operations of JAX: {error}"
-        raise RobotError(message.splitlines()[0], name=where) from error
+        raise RobotError(message.splitlines()[0], name=location) from error
     if sampled.shape != (3,):
-        raise RobotError(f"the function must return three components, not the shape {sampled.shape}", name=where)
+        raise RobotError(f"the function must return three components, not the shape {sampled.shape}", name=location)
     return WrenchPart(np.zeros(3), sampled, of_state)

@@ -76,11 +76,12 @@ def wrench_arrays(
     check_wrenches(robot, wrenches, free=free)
     arrays = []
     for k, wrench in enumerate(wrenches):
-        where = f"wrenches[{k}]"
-        parts = [
-            _derivatives(f"{where}.{name}", getattr(wrench, name), lead, levels, time) for name in ("force", "torque")
+        location = f"wrenches[{k}]"
+        pair = [
+            _derivatives(f"{location}.{name}", getattr(wrench, name), lead, levels, time)
+            for name in ("force", "torque")
         ]
-        arrays.append(jnp.concatenate(parts, axis=-1) if is_traced(parts) else np.concatenate(parts, axis=-1))
+        arrays.append(jnp.concatenate(pair, axis=-1) if is_traced(pair) else np.concatenate(pair, axis=-1))
     return tuple(arrays)
 
 
@@ -89,20 +90,20 @@ def check_wrenches(robot: Robot, wrenches: Sequence[Wrench] | Refused, *, free: 
     if not isinstance(wrenches, Sequence) or isinstance(wrenches, str):
         raise RobotError("must be a list of jn.robot.Wrench", name="wrenches", value=type(wrenches).__name__)
     for k, wrench in enumerate(wrenches):
-        where = f"wrenches[{k}]"
+        location = f"wrenches[{k}]"
         if not isinstance(wrench, Wrench):
-            raise RobotError("must be a jn.robot.Wrench", name=where, value=type(wrench).__name__)
-        check_name("link", wrench.link, robot.frames, RobotError, name=f"{where}.link")
+            raise RobotError("must be a jn.robot.Wrench", name=location, value=type(wrench).__name__)
+        check_name("link", wrench.link, robot.frames, RobotError, name=f"{location}.link")
         if robot.frames[wrench.link].body < 0 and not free:
             message = "this link is fixed to the base: nothing moves it"
-            raise RobotError(message, name=f"{where}.link", value=wrench.link)
+            raise RobotError(message, name=f"{location}.link", value=wrench.link)
 
 
-def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, time: Any) -> Any:
+def _derivatives(location: str, value: Any, lead: tuple[int, ...], levels: int, time: Any) -> Any:
     shape = (*lead, levels, 3)
     if callable(value):
         if time is None:
-            raise RobotError("is a function of time: give the instants of the samples as `time`", name=where)
+            raise RobotError("is a function of time: give the instants of the samples as `time`", name=location)
         instants = jnp.asarray(floats("time", time, seconds))
         if instants.shape != lead:
             raise RobotError(
@@ -110,22 +111,22 @@ def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, tim
             )
         advice = "it must map a scalar time to three components with functions of jax.numpy"
         try:
-            given = shape_of_result("function", advice, lambda t: jnp.asarray(value(t), float), np.zeros(()))
+            result_shape = shape_of_result("function", advice, lambda t: jnp.asarray(value(t), float), np.zeros(()))
         except MechanismError as error:
-            raise RobotError(error.message, name=where) from error
-        if given != (3,):
-            raise RobotError(f"the function must return three components, not the shape {given}", name=where)
+            raise RobotError(error.message, name=location) from error
+        if result_shape != (3,):
+            raise RobotError(f"the function must return three components, not the shape {result_shape}", name=location)
         jet = Jet.variable(instants, levels - 1)
-        parts = [compose(partial(_component, value, i), jet).derivatives() for i in range(3)]
-        return jnp.moveaxis(jnp.stack(parts, axis=1), (0, 1), (-2, -1))
-    array = floats(where, by_component(where, value, RobotError))
+        components_ = [compose(partial(_component, value, i), jet).derivatives() for i in range(3)]
+        return jnp.moveaxis(jnp.stack(components_, axis=1), (0, 1), (-2, -1))
+    array = floats(location, by_component(location, value, RobotError))
     if array.shape == (3,):
         level = np.zeros((levels, 1))
         level[0] = 1.0
         library = jnp if isinstance(array, jax.Array) else np
         return library.broadcast_to(level * array[None], shape)
     if array.shape != shape:
-        raise RobotError(f"must have the shape (3,) or {shape}, not {array.shape}", name=where)
+        raise RobotError(f"must have the shape (3,) or {shape}, not {array.shape}", name=location)
     return array
 
 

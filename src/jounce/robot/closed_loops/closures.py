@@ -114,7 +114,7 @@ def _placed(
 
     (origin, axes), (point_j, axes_j) = map(point_and_axes, link_frames)
     components_ = [stack([axis.dot(vector) for axis in axes]) for vector in (point_j - origin, *axes_j)]
-    return jnp.stack([stacked(part) for part in components_], axis=1)
+    return jnp.stack([stacked(jet) for jet in components_], axis=1)
 
 
 def _missing_turn(closure: Closure, rotation: np.ndarray) -> np.ndarray:
@@ -259,7 +259,7 @@ class Loops:
             rows = wrenches @ slope @ motions
             left, sizes, right = np.linalg.svd(rows)
             rank = int(np.sum(sizes > RANK_TOLERANCE))
-            groups.append(tuple(_aligned(part) @ wrenches for part in (left[:, :rank], left[:, rank:])))
+            groups.append(tuple(_aligned(basis) @ wrenches for basis in (left[:, :rank], left[:, rank:])))
             motions = motions @ right[rank:].T
         return groups
 

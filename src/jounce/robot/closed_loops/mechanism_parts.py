@@ -325,16 +325,16 @@ def _check_couplings(robot: AbstractRobot) -> None:
     """
     advice = "leave it out with drives=False, or take all that it has from the robot"
     for coupling in robot.couplings.values():
-        where = f"couplings.{coupling.name}"
+        location = f"couplings.{coupling.name}"
         if isinstance(coupling, Tendon):
             if any((coupling.stiffness, coupling.damping, coupling.friction, coupling.armature)):
-                raise RobotError(f"a tendon along joints has no counterpart in a mechanism; {advice}", name=where)
+                raise RobotError(f"a tendon along joints has no counterpart in a mechanism; {advice}", name=location)
             continue
         body = robot.frames[robot.joints[coupling.joints[0]].parent].body
         turns = robot.opened().tree.ancestors[body] * robot.opened().tree.turning if body >= 0 else np.zeros(1)
         if coupling.armature and np.any(turns):
             message = "the armature of a ball whose parent turns has no counterpart in a mechanism"
-            raise RobotError(f"{message}; {advice}", name=f"{where}.armature", value=coupling.armature)
+            raise RobotError(f"{message}; {advice}", name=f"{location}.armature", value=coupling.armature)
 
 
 def _unused(name: str, taken_names: Container[str]) -> str:

@@ -320,14 +320,14 @@ class AbstractRobot(Displayed, abc.ABC):
 
     def _checked_closure(self, closure: Closure) -> Closure:
         """Return a closure with missing values from the pose at coordinates zero."""
-        where = f"closures.{closure.name}"
+        location = f"closures.{closure.name}"
         if closure.name in self.joints:
-            raise RobotError("a joint and a closure have the same name", name=where)
+            raise RobotError("a joint and a closure have the same name", name=location)
         for link in closure.links:
-            check_name("link", link, self.links, RobotError, name=where)
+            check_name("link", link, self.links, RobotError, name=location)
         if len({self.frames[link].body for link in closure.links}) == 1:
             message = "these links are fixed to one another already; a closure joins links that move"
-            raise RobotError(message, name=f"{where}.links", value=list(closure.links))
+            raise RobotError(message, name=f"{location}.links", value=list(closure.links))
         poses = _poses_at_zero(self.joints)
         (origin, rotation_i), (origin_j, rotation_j) = (poses[link] for link in closure.links)
         points, rotation = closure.points, closure.rotation

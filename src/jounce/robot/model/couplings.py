@@ -19,10 +19,10 @@ OF_BALL = ("armature", "damping", "friction")
 def _check_numbers(coupling: Any, fields: Sequence[str]) -> None:
     """Convert the values of fields to numbers; raise RobotError if one other than ``rest`` is negative."""
     for field in fields:
-        where = f"couplings.{coupling.name}.{field}"
-        value = float(finite_numbers(where, getattr(coupling, field), ()))
+        location = f"couplings.{coupling.name}.{field}"
+        value = float(finite_numbers(location, getattr(coupling, field), ()))
         if value < 0 and field != "rest":
-            raise RobotError("must be zero or greater", name=where, value=value)
+            raise RobotError("must be zero or greater", name=location, value=value)
         object.__setattr__(coupling, field, value)
 
 
@@ -73,8 +73,8 @@ class Tendon:
 
     def __post_init__(self) -> None:
         _check_numbers(self, OF_TENDON)
-        where = f"couplings.{self.name}.weights"
-        numbers = {joint: float(finite_numbers(f"{where}.{joint}", x, ())) for joint, x in self.weights.items()}
+        location = f"couplings.{self.name}.weights"
+        numbers = {joint: float(finite_numbers(f"{location}.{joint}", x, ())) for joint, x in self.weights.items()}
         object.__setattr__(self, "weights", numbers)
 
     @property
@@ -158,9 +158,9 @@ def check_coupling(coupling: Any, joints: Mapping[str, Any], free: Collection[st
     """
     moving_joints = [name for name, joint in joints.items() if joint.moving]
     names = free if isinstance(coupling, BallDrive) else moving_joints
-    where = f"couplings.{coupling.name}"
+    location = f"couplings.{coupling.name}"
     for name in coupling.joints:
-        check_name("moving joint", name, names, RobotError, name=where)
+        check_name("moving joint", name, names, RobotError, name=location)
     if not isinstance(coupling, BallDrive):
         return
     turns = [joints[name] for name in coupling.joints]
@@ -169,4 +169,4 @@ def check_coupling(coupling: Any, joints: Mapping[str, Any], free: Collection[st
     axes = np.array([turn.axis for turn in turns])
     if not chained or displaced or not all(turn.turning for turn in turns) or np.any(axes != np.eye(3)[::-1]):
         message = "must be three turns in a row about z, y and x at one point, as those of a ball"
-        raise RobotError(message, name=f"{where}.joints", value=list(coupling.joints))
+        raise RobotError(message, name=f"{location}.joints", value=list(coupling.joints))

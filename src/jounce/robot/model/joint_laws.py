@@ -102,14 +102,14 @@ GivenLaws = ArrayLike | Callable[..., Any] | Mapping[str, Any] | JointTrajectory
 """Forces of joints: constants, a function of time and state, or one law for each joint by its name."""
 
 
-def joint_laws(names: Sequence[str], given: GivenLaws | None, argument: str = "torque") -> AbstractJointLaws:
+def joint_laws(names: Sequence[str], user_laws: GivenLaws | None, argument: str = "torque") -> AbstractJointLaws:
     """Return the checked laws of the joint forces that a user gives.
 
     Parameters
     ----------
     names : sequence of str
         Names of the joints, in the order of q.
-    given : None, array_like of shape (n,), callable, mapping, JointTrajectory or AbstractJointLaws
+    user_laws : None, array_like of shape (n,), callable, mapping, JointTrajectory or AbstractJointLaws
         None for no forces; constants; a function of time, q and rates of one sample, by operations of JAX, that
         returns n forces; or one law for each joint that has a force: a number, an expression of ``t``, of the names of
         joints and of their rates as ``NAME_d1``, a motion law, or a function that returns one force.
@@ -122,22 +122,22 @@ def joint_laws(names: Sequence[str], given: GivenLaws | None, argument: str = "t
         If a joint does not exist, or a law is not valid or returns another shape.
     """
     count, nothing = len(names), np.zeros(len(names))
-    if given is None:
+    if user_laws is None:
         return JointLaws(nothing, None, (), ())
-    if isinstance(given, AbstractJointLaws):
-        return given
-    if isinstance(given, JointTrajectory):
-        given = given.laws
-    if callable(given):
-        return JointLaws(nothing, _read(given, count, (count,), argument), (), ())
-    if not isinstance(given, Mapping):
-        constant = np.asarray(floats(argument, in_order(argument, given, names, RobotError)))
+    if isinstance(user_laws, AbstractJointLaws):
+        return user_laws
+    if isinstance(user_laws, JointTrajectory):
+        user_laws = user_laws.laws
+    if callable(user_laws):
+        return JointLaws(nothing, _read(user_laws, count, (count,), argument), (), ())
+    if not isinstance(user_laws, Mapping):
+        constant = np.asarray(floats(argument, in_order(argument, user_laws, names, RobotError)))
         if constant.shape != (count,) or not np.isfinite(constant).all():
             message = f"must hold {count} finite numbers, one for each joint, or be a function, or a mapping of names"
             raise RobotError(message, name=argument, value=constant.tolist())
         return JointLaws(constant, None, (), ())
     laws: dict[int, Any] = {}
-    for name, law in given.items():
+    for name, law in user_laws.items():
         check_name("moving joint", name, names, RobotError, name=argument)
         laws[names.index(name)] = _single(law, tuple(names), f"{argument}.{name}")
     for k in [k for k, law in laws.items() if isinstance(law, float)]:
@@ -145,33 +145,33 @@ def joint_laws(names: Sequence[str], given: GivenLaws | None, argument: str = "t
     return JointLaws(nothing, None, tuple(laws.values()), tuple(laws))
 
 
-def _single(law: Any, names: tuple[str, ...], where: str) -> Any:
+def _single(law: Any, names: tuple[str, ...], location: str) -> Any:
     if isinstance(law, str):
         try:
             expression = Expression(law)
             expression.check({"t", *names, *(name + RATE for name in names)})
         except JounceError as error:
-            error.name = where
+            error.name = location
             raise
         return _Expressed(expression, names)
     if isinstance(law, AbstractMotion):
         return _ForceOfTime(read_laws(law))
     if callable(law):
-        return _read(law, len(names), (), where)
-    value = float(floats(where, law)) if np.ndim(law) == 0 else np.nan
+        return _read(law, len(names), (), location)
+    value = float(floats(location, law)) if np.ndim(law) == 0 else np.nan
     if not np.isfinite(value):
         message = "must be a finite number, an expression, a motion law or a function of time, q and rates"
-        raise RobotError(message, name=where, value=law)
+        raise RobotError(message, name=location, value=law)
     return value
 
 
-def _read(function: Callable[..., Any], count: int, shape: tuple[int, ...], where: str) -> SampleFunction:
-    return read_forces(function, where, shape, (jnp.zeros(()), jnp.zeros(count), jnp.zeros(count)))
+def _read(function: Callable[..., Any], count: int, shape: tuple[int, ...], location: str) -> SampleFunction:
+    return read_forces(function, location, shape, (jnp.zeros(()), jnp.zeros(count), jnp.zeros(count)))
 
 
 def read_forces(
     function: Callable[..., Any],
-    where: str,
+    location: str,
     shape: tuple[int, ...],
     state: Sequence[Any],
     arguments: str = "time, q and rates",
@@ -182,7 +182,7 @@ def read_forces(
     ----------
     function : callable
         Function of arrays of one sample.
-    where : str
+    location : str
         Argument that gave the function, for messages.
     shape : tuple of int
         Shape that the function must return.
@@ -200,8 +200,8 @@ def read_forces(
         sampled = SampleFunction.of(function, *state)
     except TypeError as error:
         message = f"must be a function of {arguments}, by operations of JAX: {str(error).splitlines()[0]}"
-        raise RobotError(message, name=where) from error
+        raise RobotError(message, name=location) from error
     if sampled.shape != shape:
         noun = f"an array of {shape[0]} forces" if shape else "one number"
-        raise RobotError(f"the function must return {noun}, the shape {shape}, not {sampled.shape}", name=where)
+        raise RobotError(f"the function must return {noun}, the shape {shape}, not {sampled.shape}", name=location)
     return sampled

@@ -171,28 +171,28 @@ class Joint:
     start: float = 0.0
 
     def __post_init__(self) -> None:
-        where = f"joints.{self.name}"
-        check_name("joint", self.type, TYPES, RobotError, "type", name=f"{where}.type")
+        location = f"joints.{self.name}"
+        check_name("joint", self.type, TYPES, RobotError, "type", name=f"{location}.type")
         for field, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,))):
-            object.__setattr__(self, field, vector_numbers(f"{where}.{field}", getattr(self, field), shape))
-        rotation_matrix(f"{where}.rotation", self.rotation)
+            object.__setattr__(self, field, vector_numbers(f"{location}.{field}", getattr(self, field), shape))
+        rotation_matrix(f"{location}.rotation", self.rotation)
         length = math.hypot(*self.axis)
         if self.type != "fixed":
             if length < 1e-9:
-                raise RobotError("must have a direction", name=f"{where}.axis", value=self.axis.tolist())
+                raise RobotError("must have a direction", name=f"{location}.axis", value=self.axis.tolist())
             object.__setattr__(self, "axis", self.axis if abs(length - 1) < 1e-15 else unchanging(self.axis / length))
         for field in ("armature", "damping", "stiffness"):
-            value = float(finite_numbers(f"{where}.{field}", getattr(self, field), ()))
+            value = float(finite_numbers(f"{location}.{field}", getattr(self, field), ()))
             if value < 0:
-                raise RobotError("must be zero or greater", name=f"{where}.{field}", value=value)
+                raise RobotError("must be zero or greater", name=f"{location}.{field}", value=value)
             object.__setattr__(self, field, value)
-        friction = finite_numbers(f"{where}.friction", self.friction, (), (2,))
+        friction = finite_numbers(f"{location}.friction", self.friction, (), (2,))
         if np.any(friction < 0):
-            raise RobotError("must be zero or greater", name=f"{where}.friction", value=friction.tolist())
+            raise RobotError("must be zero or greater", name=f"{location}.friction", value=friction.tolist())
         forward, backward = (float(x) for x in np.broadcast_to(friction, 2))
         object.__setattr__(self, "friction", forward if forward == backward else (forward, backward))
         for field in ("spring_reference", "start"):
-            object.__setattr__(self, field, float(finite_numbers(f"{where}.{field}", getattr(self, field), ())))
+            object.__setattr__(self, field, float(finite_numbers(f"{location}.{field}", getattr(self, field), ())))
 
     @property
     def moving(self) -> bool:
@@ -319,22 +319,22 @@ class Closure:
     rotation: Any = None
 
     def __post_init__(self) -> None:
-        where = f"closures.{self.name}"
-        check_name("closure", self.type, CLOSURES, RobotError, "type", name=f"{where}.type")
+        location = f"closures.{self.name}"
+        check_name("closure", self.type, CLOSURES, RobotError, "type", name=f"{location}.type")
         links = () if isinstance(self.links, str) else tuple(self.links)
         if len(links) != 2 or links[0] == links[1]:
-            raise RobotError("must be two different links", name=f"{where}.links", value=self.links)
+            raise RobotError("must be two different links", name=f"{location}.links", value=self.links)
         object.__setattr__(self, "links", links)
-        object.__setattr__(self, "points", vector_numbers(f"{where}.points", self.points, (3,), (2, 3)))
+        object.__setattr__(self, "points", vector_numbers(f"{location}.points", self.points, (3,), (2, 3)))
         if self.type in ("pin", "slider"):
-            axis = vector_numbers(f"{where}.axis", self.axis, (3,)) if self.axis is not None else np.zeros(3)
+            axis = vector_numbers(f"{location}.axis", self.axis, (3,)) if self.axis is not None else np.zeros(3)
             length = float(np.linalg.norm(axis))
             if length < 1e-9:
                 value = None if self.axis is None else axis.tolist()
-                raise RobotError(f"a {self.type} needs the direction of its axis", name=f"{where}.axis", value=value)
+                raise RobotError(f"a {self.type} needs the direction of its axis", name=f"{location}.axis", value=value)
             object.__setattr__(self, "axis", unchanging(axis / length))
         if self.rotation is not None:
-            object.__setattr__(self, "rotation", rotation_matrix(f"{where}.rotation", self.rotation))
+            object.__setattr__(self, "rotation", rotation_matrix(f"{location}.rotation", self.rotation))
 
 
 def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:

@@ -320,13 +320,13 @@ def _tendons(moving_joints: Sequence[Joint], order: Sequence[str], couplings: Se
     rows += [(line.weights, *(getattr(line, field) for field in OF_TENDON)) for line in lines]
     by_name = {joint.name: joint for joint in moving_joints}
     weights, numbers = np.zeros((len(rows), len(order))), []
-    for k, (named_weights, stiffness, rest, *others) in enumerate(rows):
+    for k, (named_weights, stiffness, rest, *losses_) in enumerate(rows):
         for name, weight in named_weights.items():
             mimic = by_name[name].mimic or Mimic(name)
             for leader, factor in mimic.weights.items():
                 weights[k, order.index(leader)] += weight * factor
             rest -= weight * mimic.offset
-        numbers.append((stiffness, rest, *others))
+        numbers.append((stiffness, rest, *losses_))
     return Tendons(weights, *np.array(numbers, float).reshape(-1, len(OF_TENDON)).T)
 
 

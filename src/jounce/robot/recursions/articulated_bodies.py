@@ -141,12 +141,12 @@ class ArticulatedBodies(Module):
         moment, force = (jnp.moveaxis(x, 0, 1) for x in (moment, force))
         return cls(tree, axis, arm, moment, force, compliance, margin, factor)
 
-    def solve(self, along: Joints, at_base: BaseVector | None = None) -> tuple[Joints, BaseVector | None]:
+    def solve(self, efforts: Joints, at_base: BaseVector | None = None) -> tuple[Joints, BaseVector | None]:
         """Return the accelerations that forces along the joints cause, and that of a free base.
 
         Parameters
         ----------
-        along : array of shape (bodies, batch)
+        efforts : array of shape (bodies, batch)
             Force or torque along each joint.
         at_base : array of shape (6, batch), optional
             Moment about the origin of a free base, and force on it.
@@ -161,11 +161,11 @@ class ArticulatedBodies(Module):
         turning = jnp.asarray(tree.turning)
 
         def inward(state: Any, entry: Any) -> tuple[Any, Any]:
-            (slot, parent_slot, turn), z, r, moment, force, compliance, given = entry
+            (slot, parent_slot, turn), z, r, moment, force, compliance, effort = entry
             m, f = read_slot(tree, state, slot)
-            net_force = given - jnp.sum(z * (turn * m + (1 - turn) * f), axis=0)
-            given = (net_force * compliance)[None]
-            m, f = m + moment * given, f + force * given
+            net_force = effort - jnp.sum(z * (turn * m + (1 - turn) * f), axis=0)
+            effort = (net_force * compliance)[None]
+            m, f = m + moment * effort, f + force * effort
             passed_wrench = m + cross(r, f), f
             if tree.shape.slots > 1:
                 state = write_slot(tree, state, slot, jax.tree.map(jnp.zeros_like, passed_wrench))
@@ -184,7 +184,7 @@ class ArticulatedBodies(Module):
         rows = (jnp.moveaxis(x, 1, 0) for x in (self.axis, self.arm, self.moment, self.force))
         bodies = (tree_arrays, *rows, self.compliance)
         nothing = jnp.zeros((3, self.axis.shape[-1]))
-        state, net_force = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies, along), reverse=True)
+        state, net_force = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies, efforts), reverse=True)
         start, base = (nothing, nothing), None
         if self.base is not None and at_base is not None:
             base_state = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
