@@ -201,8 +201,8 @@ class _Spread:
 
         def outputs(values: Any) -> dict[str, Any]:
             changed = self.mechanism.with_parameters(**dict(zip(self.names, values, strict=True)))
-            values_ = solve(changed, self.nominal.time, self.nominal.order).outputs
-            return {name: values_[name] for name in self._outputs}
+            results = solve(changed, self.nominal.time, self.nominal.order).outputs
+            return {name: results[name] for name in self._outputs}
 
         for name, gradient in jax.jacfwd(outputs)(start).items():
             dims = self._variables[name].dims

@@ -140,7 +140,7 @@ def slope_values(
     """
     points = pose.point(center).dense().coefficients
     axes = zip(*(axis.dense().coefficients for axis in axes_of(pose)), strict=True)
-    products = _Products([jnp.stack(components_, axis=1) for components_ in axes], moments)
+    products = _Products([jnp.stack(rows, axis=1) for rows in axes], moments)
     linear, angular = (column.dense().coefficients for column in columns)
     values = []
     for level, row in enumerate(form.weights):

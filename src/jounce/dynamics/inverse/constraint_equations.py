@@ -270,9 +270,9 @@ def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivativ
     moving_bodies = {name: np.asarray(values)[..., 1:, :] for name, values in coordinates.items()}  # without the ground
     derivatives = {name: plain_derivatives(values) for name, values in moving_bodies.items()}
     turns = derivatives["angle"][1:, None] if "angle" in derivatives else derivatives["angular_velocity"]
-    columns_ = np.concatenate([derivatives["position"][1 : order + 1], turns[:order]], axis=1)
+    rates = np.concatenate([derivatives["position"][1 : order + 1], turns[:order]], axis=1)
     columns = motion.model.system.shape[1]
-    return np.transpose(columns_, (3, 0, 2, 1)).reshape(len(motion.time), order, columns)
+    return np.transpose(rates, (3, 0, 2, 1)).reshape(len(motion.time), order, columns)
 
 
 def _positions(motion: Motion) -> dict[str, Any]:

@@ -155,8 +155,8 @@ def balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, An
     def rubbed(group: Group) -> Rubbed:
         moving_poses = [pose.truncate(levels).take(indices) for indices in group.bodies]
         slopes = [friction_slope(group.element, moving_poses, slot) for slot in group.moving_slots]
-        bodies_ = [body.truncate(levels - 1) for body in moving_poses]
-        return slopes, bodies_, stacked(resisting(group.element, moving_poses)) if loses_torque(group.element) else None
+        reduced = [body.truncate(levels - 1) for body in moving_poses]
+        return slopes, reduced, stacked(resisting(group.element, moving_poses)) if loses_torque(group.element) else None
 
     def of_chunk(blocks: Slopes, load: Numbers, mass: Any, rubbed: Sequence[Rubbed]) -> Any:
         if not rubbed:
@@ -206,8 +206,8 @@ def exerted(driver: Any, lanes: tuple[Sequence[Coordinates], Lanes, Multipliers]
     """Return the forces of drivers along their prescribed coordinates, as Taylor coefficients."""
     poses, instants, forces = lanes
     order = len(forces) - 1
-    poses_ = [pose_of(pose, pose_type, order) for pose in poses]
-    return constraint_forces.exerted(driver, poses_, Jet.variable(instants[None], order), forces)
+    jets = [pose_of(pose, pose_type, order) for pose in poses]
+    return constraint_forces.exerted(driver, jets, Jet.variable(instants[None], order), forces)
 
 
 @Mapped

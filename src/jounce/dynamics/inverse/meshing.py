@@ -123,14 +123,14 @@ def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names:
             "helix_angle",
         ),
     )
-    for is_wrong, message_, field in faults:
+    for is_wrong, template, field in faults:
         if (odd := np.argwhere(is_wrong & (motion.status == Status.OK))).size:
             position = tuple(odd[0])
             numbers = {"first": first[position], "second": second[position], "sliding": geometry["sliding"][position]}
             numbers["distance"] = geometry["distance"][position]
             numbers["lead"] = np.degrees(geometry["lead"][position])
-            message = message_.format(time=motion.time[position[1]], **numbers)
-            raise MechanismError(message, name=f"{names[position[0]]}.{field}")
+            text = template.format(time=motion.time[position[1]], **numbers)
+            raise MechanismError(text, name=f"{names[position[0]]}.{field}")
 
 
 @Mapped

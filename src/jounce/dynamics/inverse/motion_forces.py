@@ -263,11 +263,11 @@ class MotionForces:
         # the carriage of a joint with a hidden coordinate does not count as a body
         slots = enumerate(bodies[: len(bodies) - bool(getattr(element, "hidden", ()))])
         if body:
-            work = total(self._wrench(name, slot) for slot, index_ in slots if index_ == body)
+            work = total(self._wrench(name, slot) for slot, member in slots if member == body)
             return self._expressed(work, body, frame, point)
-        movable = {slot: index_ for slot, index_ in slots if index_ and slot not in getattr(element, "unfelt", ())}
+        movable = {slot: member for slot, member in slots if member and slot not in getattr(element, "unfelt", ())}
         works = [self._wrench(name, slot) for slot in movable]
-        poses = [self.coordinates_of((index_,), self.levels) for index_ in movable.values()]
+        poses = [self.coordinates_of((member,), self.levels) for member in movable.values()]
         work = self.along(programs.transmitted_wrench, point[:, None, None], (works, poses))
         return self._expressed(work, 0, frame, np.zeros(np.shape(point)))
 

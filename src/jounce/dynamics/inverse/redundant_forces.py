@@ -61,20 +61,20 @@ def least_multipliers(
     basis = range_basis(jnp.swapaxes(jacobian, 0, 1), system.rank or rows)
     reduced = jnp.sum(basis[:, :, None] * jnp.swapaxes(jacobian, 0, 1)[:, None], axis=0)
     factor = DenseFactor.of(saddle_point((jnp.eye(rows) * soft)[..., None], reduced))
-    multipliers_: list[Any] = []
+    orders: list[Any] = []
     strains: list[Any] = []
     for k in range(len(load)):
         deficit = load[k]
-        for group, slopes, forces in by_group(system, blocks, multipliers_):
+        for group, slopes, forces in by_group(system, blocks, orders):
             for slot, slope in zip(group.moving_slots, slopes, strict=True):
                 deficit -= onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
         gaps = -_jacobian_times_displacements(system, blocks, strains, k) * system.row_scale
         gaps = gaps + (bent[:, None] if k == 0 else 0.0)
         right = jnp.sum(basis * as_column(deficit, scale)[:, None], axis=0)
         solution = factor.solve(jnp.concatenate([jnp.broadcast_to(gaps, (rows, right.shape[-1])), right]))
-        multipliers_.append(solution[:rows] * system.row_scale)
+        orders.append(solution[:rows] * system.row_scale)
         strains.append(by_body(jnp.sum(basis * solution[rows:][None], axis=1), scale))
-    return jnp.stack(multipliers_)
+    return jnp.stack(orders)
 
 
 def _jacobian_times_displacements(

@@ -82,7 +82,7 @@ def multipliers_on_flanks(
     rate, reversals, unsettled = rate_of(motion), {}, []
     for _ in range(MOST_CHANGES):
         pairs = {k: _signs(of_group(multipliers[0], k), multipliers[0], rate) for k in flanks}
-        next_flanks, reversals = ({k: pair[index_] for k, pair in pairs.items()} for index_ in (0, 1))
+        next_flanks, reversals = ({k: pair[member] for k, pair in pairs.items()} for member in (0, 1))
         unsettled = [(next_flanks[k] != flanks[k]).any(axis=0) for k in flanks]
         if not np.any(unsettled):
             break

@@ -163,9 +163,9 @@ def infinite_quantities(followed: FollowedTrajectory, jumps: Jumps, drives: bool
     after, effort_before, rest_effort, *pushed = efforts
     changes = np.stack([*(pushed_effort - rest_effort for pushed_effort in pushed), after - effort_before])
     changed = np.where(np.abs(changes) > threshold, np.sign(changes), 0.0)
-    for quantity, signs_ in ((EFFORT, changed[:2]), (EFFORT_RATE, changed)):
-        level_index = np.argmax(signs_ != 0, axis=0)
-        signs[:, quantity] = np.take_along_axis(signs_, level_index[None], axis=0)[0]
+    for quantity, effort_signs in ((EFFORT, changed[:2]), (EFFORT_RATE, changed)):
+        level_index = np.argmax(effort_signs != 0, axis=0)
+        signs[:, quantity] = np.take_along_axis(effort_signs, level_index[None], axis=0)[0]
     return Infinite(jumps.times, signs, before)
 
 

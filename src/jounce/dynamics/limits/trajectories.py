@@ -223,8 +223,8 @@ def trajectory_torques(
         attributes = {"units": "N*m" if robot.joints[name].turning else "N", "long_name": derivatives_of(name)}
         variables[name] = (("time", "derivative"), values[..., k], attributes)
     axes = time_axes(instants, rates + 1)
-    attributes_ = {"title": robot.name, "source": "jounce", "drives": drives_note(drives)}
-    return xarray.Dataset(variables, coords=axes, attrs=attributes_)
+    header = {"title": robot.name, "source": "jounce", "drives": drives_note(drives)}
+    return xarray.Dataset(variables, coords=axes, attrs=header)
 
 
 def _in_blocks(function: Callable[[np.ndarray], Any], values: np.ndarray) -> np.ndarray:

@@ -30,20 +30,20 @@ def lines_of(trajectory: JointTrajectory) -> Lines | None:
     times = [law_samples[0] for law_samples in samples.values() if law_samples is not None]
     if not times:
         return None
-    instants = [trajectory.start, trajectory.stop, *times]
+    all_times = [trajectory.start, trajectory.stop, *times]
     if any(law_samples is None for law_samples in samples.values()):
-        instants.append(np.linspace(trajectory.start, trajectory.stop, SAMPLES + 1))
-    times_ = np.unique(np.hstack(instants))
-    times_ = times_[(times_ >= trajectory.start) & (times_ <= trajectory.stop)]
+        all_times.append(np.linspace(trajectory.start, trajectory.stop, SAMPLES + 1))
+    instants = np.unique(np.hstack(all_times))
+    instants = instants[(instants >= trajectory.start) & (instants <= trajectory.stop)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
         path = None if all(samples.values()) else Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
-        columns = None if path is None else path.derivatives(times_, 0)[:, 0]
+        columns = None if path is None else path.derivatives(instants, 0)[:, 0]
     points = [
-        np.interp(times_, *law_samples) if law_samples is not None else columns[:, k]  # type: ignore[index]
+        np.interp(instants, *law_samples) if law_samples is not None else columns[:, k]  # type: ignore[index]
         for k, law_samples in enumerate(samples.values())
     ]
-    return Lines(times_, np.stack(points, axis=1), trajectory.names, "samples")
+    return Lines(instants, np.stack(points, axis=1), trajectory.names, "samples")
 
 
 def lines_along(path: Path) -> Lines:

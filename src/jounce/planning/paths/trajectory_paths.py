@@ -286,14 +286,14 @@ def _splined(path: Path, times: np.ndarray, lengths: np.ndarray, stops: Stops, o
     widths = np.minimum(WIDEST * total_length, np.minimum(np.diff(edges)[:-1], np.diff(edges)[1:]) / 2)
     is_reversal = stops.turns > np.pi - BACK
     ramps = Ramps(stops.lengths[is_reversal], widths[is_reversal], 2)
-    parameters_ = ramps.parameter(lengths)
+    own_parameters = ramps.parameter(lengths)
     edges = ramps.parameter(edges)
     counts = np.maximum(PART, np.ceil(count * np.diff(edges) / edges[-1]).astype(int))
     nodes = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True)]
     parameters = np.append(np.concatenate(nodes), edges[-1])
     breaks = np.append(0, np.cumsum(counts))
-    instants = np.interp(parameters, parameters_, times)
-    instants[breaks] = times[np.searchsorted(parameters_, edges)]
+    instants = np.interp(parameters, own_parameters, times)
+    instants[breaks] = times[np.searchsorted(own_parameters, edges)]
     indices = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(times) - 1)
     knots = ramps.parameter(lengths[indices] + _between(path, times[indices], instants))
     knots[breaks] = edges
@@ -302,14 +302,14 @@ def _splined(path: Path, times: np.ndarray, lengths: np.ndarray, stops: Stops, o
     if is_reversal.all():
         scale = edges[-1]
         laws = {name: SplineMotion(knots / scale, x, DEGREE) for name, x in zip(path.names, points.T, strict=True)}
-        result, positions = Path(laws, 0.0, 1.0), parameters_ / scale
+        result, positions = Path(laws, 0.0, 1.0), own_parameters / scale
     else:
         joints = breaks[np.concatenate([[True], ~is_reversal, [True]])]
         corners = Ramps(edges[1:-1][~is_reversal], widths[~is_reversal], order + 1)
         leader = corners.motion(float(edges[-1]))
         columns = zip(path.names, points.T, strict=True)
         laws = {name: FollowingMotion(_joined(knots, column, joints), leader) for name, column in columns}
-        result, positions = Path(laws, 0.0, float(leader.stop)), corners.parameter(parameters_)
+        result, positions = Path(laws, 0.0, float(leader.stop)), corners.parameter(own_parameters)
     positions = np.clip(positions, result.start, result.stop)
     deviations = np.linalg.norm(result.derivatives(positions, 0)[:, 0] - path.derivatives(times, 0)[:, 0], axis=1)
     return dataclasses.replace(result, deviation=float(deviations.max()), passed=(positions, times))

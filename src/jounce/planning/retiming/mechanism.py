@@ -89,7 +89,7 @@ def _checked(source: MechanismQuantities, mechanism: Mechanism, law: RateLaw) ->
     motion = rate_motion(law)
     progress = FollowingMotion(law.parameter, motion)
     laws = _MechanismLaws(
-        {name: FollowingMotion(law_, progress) for name, law_ in source.laws.items()}, motion.duration, progress
+        {name: FollowingMotion(path_law, progress) for name, path_law in source.laws.items()}, motion.duration, progress
     )
     times = np.linspace(0.0, motion.duration, INSTANTS)
     _, _, ratios = source.ratios_of(progress, times)

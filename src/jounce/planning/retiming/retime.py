@@ -182,15 +182,15 @@ def retime(
 
     quantities = functools.partial(_quantities, robot, limits=limits, drives=drives, loads=path_loads)
 
-    def planned(path_: Path, conditions: Conditions, junction_s: float | None) -> RetimedTrajectory:
-        source = quantities(path_)
+    def planned(route: Path, conditions: Conditions, junction_s: float | None) -> RetimedTrajectory:
+        source = quantities(route)
         if junction_s is None:  # a curve joined to a path is already smooth
-            checked(path_, chosen)
+            checked(route, chosen)
         source.check_range()
-        own_cells = cells or cells_needed(path_, chosen)
-        law, search = fastest(source, source.labels, path_.start, path_.stop, conditions, own_cells, junction_s)
+        own_cells = cells or cells_needed(route, chosen)
+        law, search = fastest(source, source.labels, route.start, route.stop, conditions, own_cells, junction_s)
         certified = functools.partial(
-            _certified, robot, path_, search=search, source=source, drives=drives, hand_over=any(conditions.rates)
+            _certified, robot, route, search=search, source=source, drives=drives, hand_over=any(conditions.rates)
         )
         if duration is None:
             return certified(law)
@@ -319,7 +319,7 @@ def _certified(
         if search.duration is not None and not any(search.conditions.rates):
             motion = motion.slower(search.duration / motion.duration)  # exactly
         progress = FollowingMotion(law.parameter, motion)
-        laws = {name: FollowingMotion(law_, progress) for name, law_ in path.laws.items()}
+        laws = {name: FollowingMotion(joint_law, progress) for name, joint_law in path.laws.items()}
         trajectory = JointTrajectory(laws, 0.0, motion.duration, np.linspace(0.0, motion.duration, law.basis.cells + 1))
         loads = in_time(source.loaded.loads, progress, motion.duration)
         report = check_motion(robot, trajectory, source.limits, drives=drives, hand_over=hand_over, loads=loads)

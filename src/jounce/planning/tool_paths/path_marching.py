@@ -76,8 +76,8 @@ def march(equations: PathEquations, start: Any, steps: Any, targets: Any, inner:
         series = equations.series(corrected.u, factor, target, ORDER)
         powers = (shares * step)[None] ** jnp.arange(ORDER + 1.0)[:, None]
         positions = jnp.sum(series * powers[:, None], axis=0)
-        change_ = equations.matrix(positions, values) - factor.matrix
-        change = jnp.sum(factor.inverse[:, :, None] * change_[None], axis=1)
+        difference = equations.matrix(positions, values) - factor.matrix
+        change = jnp.sum(factor.inverse[:, :, None] * difference[None], axis=1)
         change = jnp.max(jnp.sum(jnp.abs(change), axis=1))
         gap = jnp.sum(factor.inverse * equations.residual(positions[None], values)[0][None], axis=1)
         gap = jnp.max(jnp.abs(gap))

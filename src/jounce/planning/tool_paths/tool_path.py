@@ -161,8 +161,8 @@ class ToolPath(Displayed):
         angles = self._attitude[1] if isinstance(self._attitude, tuple) else None
         trajectories = [x for x in (self._position, self._direction, angles) if x is not None]
         instants = [knots(law, self.start, self.stop) for x in trajectories for law in x.laws.values()]
-        instants_ = np.unique(np.concatenate([np.zeros(0), *instants]))
-        return instants_[(instants_ > self.start) & (instants_ < self.stop)]
+        distinct = np.unique(np.concatenate([np.zeros(0), *instants]))
+        return distinct[(distinct > self.start) & (distinct < self.stop)]
 
     def judge(self, order: int) -> None:
         """Warn, as `JointTrajectory` does, if the samples of a law do not support its derivatives to an order."""

@@ -100,8 +100,8 @@ def scene_axes(quaternion: Float[Numbers, "4 batch"], twist: TwistSeries) -> tup
 
 def in_base(axes: tuple[Jet, Jet, Jet], vector: Jet | Numbers) -> Jet:
     """Return a vector in the axes of the base from its components in the axes of the scene."""
-    components_ = [vector[i : i + 1] for i in range(3)]
-    rotated = axes[0] * components_[0] + axes[1] * components_[1] + axes[2] * components_[2]
+    coordinates = [vector[i : i + 1] for i in range(3)]
+    rotated = axes[0] * coordinates[0] + axes[1] * coordinates[1] + axes[2] * coordinates[2]
     return rotated.dense()
 
 

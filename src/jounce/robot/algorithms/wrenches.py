@@ -117,8 +117,8 @@ def _derivatives(location: str, value: Any, lead: tuple[int, ...], levels: int, 
         if result_shape != (3,):
             raise RobotError(f"the function must return three components, not the shape {result_shape}", name=location)
         jet = Jet.variable(instants, levels - 1)
-        components_ = [compose(partial(_component, value, i), jet).derivatives() for i in range(3)]
-        return jnp.moveaxis(jnp.stack(components_, axis=1), (0, 1), (-2, -1))
+        rows = [compose(partial(_component, value, i), jet).derivatives() for i in range(3)]
+        return jnp.moveaxis(jnp.stack(rows, axis=1), (0, 1), (-2, -1))
     array = floats(location, by_component(location, value, RobotError))
     if array.shape == (3,):
         level = np.zeros((levels, 1))

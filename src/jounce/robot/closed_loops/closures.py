@@ -113,8 +113,8 @@ def _placed(
         return frame.point(point), [frame.direction(axis) for axis in axes]
 
     (origin, axes), (point_j, axes_j) = map(point_and_axes, link_frames)
-    components_ = [stack([axis.dot(vector) for axis in axes]) for vector in (point_j - origin, *axes_j)]
-    return jnp.stack([stacked(jet) for jet in components_], axis=1)
+    vectors = [stack([axis.dot(vector) for axis in axes]) for vector in (point_j - origin, *axes_j)]
+    return jnp.stack([stacked(jet) for jet in vectors], axis=1)
 
 
 def _missing_turn(closure: Closure, rotation: np.ndarray) -> np.ndarray:

@@ -250,9 +250,9 @@ def arrange(
     tree = Tree(
         rotation=np.array([rotation for _, rotation in placements]).reshape(bodies, 3, 3),
         position=np.array([position for position, _ in placements]).reshape(bodies, 3),
-        mass=_array([inertia_.mass for inertia_ in combined]),
-        center=_array([inertia_.center_of_mass for inertia_ in combined]).reshape(bodies, 3),
-        inertia=_array([inertia_.tensor for inertia_ in combined]).reshape(bodies, 3, 3),
+        mass=_array([entry.mass for entry in combined]),
+        center=_array([entry.center_of_mass for entry in combined]).reshape(bodies, 3),
+        inertia=_array([entry.tensor for entry in combined]).reshape(bodies, 3, 3),
         turning=turning,
         coordinate=coordinate,
         multiplier=multiplier,
@@ -320,13 +320,13 @@ def _tendons(moving_joints: Sequence[Joint], order: Sequence[str], couplings: Se
     rows += [(line.weights, *(getattr(line, field) for field in OF_TENDON)) for line in lines]
     by_name = {joint.name: joint for joint in moving_joints}
     weights, numbers = np.zeros((len(rows), len(order))), []
-    for k, (named_weights, stiffness, rest, *losses_) in enumerate(rows):
+    for k, (named_weights, stiffness, rest, *coefficients) in enumerate(rows):
         for name, weight in named_weights.items():
             mimic = by_name[name].mimic or Mimic(name)
             for leader, factor in mimic.weights.items():
                 weights[k, order.index(leader)] += weight * factor
             rest -= weight * mimic.offset
-        numbers.append((stiffness, rest, *losses_))
+        numbers.append((stiffness, rest, *coefficients))
     return Tendons(weights, *np.array(numbers, float).reshape(-1, len(OF_TENDON)).T)
 
 

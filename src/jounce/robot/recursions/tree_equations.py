@@ -158,7 +158,7 @@ class TreeEquations(Module):
             return TreeFactor(bodies, None, free, motion.base)
         return TreeFactor(None, self._coupled(motion, free), free, motion.base)
 
-    def _coupled(self, motion: TreeState, is_free_: Any) -> tuple[DenseFactor, Any]:
+    def _coupled(self, motion: TreeState, is_free: Any) -> tuple[DenseFactor, Any]:
         """Return the factored mass matrix of a tree whose drives or followers couple joints, scaled, and the scales."""
         lanes, count = motion.axes.shape[-1], self.tree.shape.coordinates
         size = count + (6 if motion.base is not None else 0)
@@ -167,7 +167,7 @@ class TreeEquations(Module):
         units = jnp.broadcast_to(jnp.eye(size)[..., None], (size, size, lanes))
         directions = Unknowns(units[:, :count], None if motion.base is None else units[:, count:])
         matrix = jnp.concatenate([x for x in jax.vmap(slope)(directions) if x is not None], axis=1)
-        mask = jnp.concatenate([is_free_, jnp.ones(size - count)])[:, None]
+        mask = jnp.concatenate([is_free, jnp.ones(size - count)])[:, None]
         matrix = matrix * mask[:, None] * mask[None]
         matrix = matrix + jnp.eye(size)[..., None] * (1.0 - mask[:, None])
         scale = 1.0 / jnp.sqrt(jnp.stack([matrix[k, k] for k in range(size)]))

@@ -110,8 +110,8 @@ def _with_leaders(laws: Iterable[AbstractMotion]) -> Iterator[AbstractMotion]:
         yield law
         if isinstance(law, FollowingMotion):
             yield from _with_leaders(law.parts[1:])
-        elif laws_ := getattr(law, "parts", ()):
-            yield from (x for law_ in laws_ for x in _with_leaders([law_]) if x is not law_)
+        elif members := getattr(law, "parts", ()):
+            yield from (x for member in members for x in _with_leaders([member]) if x is not member)
 
 
 def may_break(law: AbstractMotion) -> bool:

@@ -46,15 +46,15 @@ def _has_singularities(expression: Expression) -> bool:
     Each operand is folded to its value if that is a number, whether it moves, and whether it has such places.
     """
 
-    def operation(operator_: str, operands: list[Any]) -> Any:
+    def operation(symbol: str, operands: list[Any]) -> Any:
         moves = [operand[1] for operand in operands]
-        smooth = operator_ in SMOOTH or not any(moves)
-        if operator_ == "/":
+        smooth = symbol in SMOOTH or not any(moves)
+        if symbol == "/":
             smooth = not moves[1]
-        if operator_ == "**" and not moves[1]:
+        if symbol == "**" and not moves[1]:
             exponent = operands[1][0]
             smooth = not moves[0] or (exponent is not None and exponent >= 0 and float(exponent).is_integer())
-        value = operands[0][0] if operator_ == "pos" else None
+        value = operands[0][0] if symbol == "pos" else None
         return value, any(moves), not smooth or any(operand[2] for operand in operands)
 
     return expression.folded(lambda x: (x, False, False), lambda name: (None, name == "t", False), operation)[2]

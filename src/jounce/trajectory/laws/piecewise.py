@@ -128,9 +128,9 @@ class PiecewiseMotion(CompositeLaw):
             repeats = self.beyond == "repeat" or self.beyond == "advance"
             first, last = (start, stop) if repeats else np.clip((first, last), start, stop).tolist()
         begins, ends = self._borders()
-        for law, start_, end in zip(self.parts, begins, ends, strict=True):
-            if first < end and last >= start_:
-                law.check_instants(max(first, start_), min(last, end))
+        for law, begin, end in zip(self.parts, begins, ends, strict=True):
+            if first < end and last >= begin:
+                law.check_instants(max(first, begin), min(last, end))
 
     def _borders(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """Return the beginning and the end of each law; the first and the last are unbounded."""

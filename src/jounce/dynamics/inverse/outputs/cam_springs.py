@@ -88,31 +88,31 @@ def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike |
         return solve(_with(mechanism, changed, output), instants, order=0).outputs["contact"][:, 0]
 
     given_value = float(resolve(getattr(force, field), mechanism.parameter_values))
-    forces_ = contact(given_value)
-    step = SHARE * max(abs(given_value), float(np.ptp(forces_)) / _stiffness(mechanism, force), 1e-6)
-    sense = 1.0 if np.mean(forces_) >= 0 else -1.0
+    contact_forces = contact(given_value)
+    step = SHARE * max(abs(given_value), float(np.ptp(contact_forces)) / _stiffness(mechanism, force), 1e-6)
+    sense = 1.0 if np.mean(contact_forces) >= 0 else -1.0
 
-    def required(forces_: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def required(contact_forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the required free length or angle at each instant, and the preload up to a constant."""
-        slope = (contact(given_value + step) - forces_) / step
+        slope = (contact(given_value + step) - contact_forces) / step
         if (sense * slope).max() * (sense * slope).min() <= 0:
             message = "does nothing to the contact force, or presses at some instants and pulls at others"
             raise MechanismError(message, name="spring", value=spring)
-        required_values = given_value - forces_ / slope
+        required_values = given_value - contact_forces / slope
         return required_values, -required_values if sense * slope[0] < 0 else required_values
 
-    required_values, preload = required(forces_)
+    required_values, preload = required(contact_forces)
     for _ in range(ROUNDS if len(instants) > 1 else 0):
         instants = _refined_at_maxima(instants, preload)
-        forces_ = contact(given_value)
-        required_values, preload = required(forces_)
+        contact_forces = contact(given_value)
+        required_values, preload = required(contact_forces)
     peak = int(np.argmax(preload))
     result = contact(float(required_values[peak]))
     if abs((sense * result).min()) > EXACT * np.abs(result).max():
         raise MechanismError(
             "does not change the contact force in proportion to its free length or angle", name="spring", value=spring
         )
-    return ContactSpring(float(required_values[peak]), float(instants[peak]), float((sense * forces_).min()))
+    return ContactSpring(float(required_values[peak]), float(instants[peak]), float((sense * contact_forces).min()))
 
 
 def _refined_at_maxima(instants: np.ndarray, values: np.ndarray) -> np.ndarray:

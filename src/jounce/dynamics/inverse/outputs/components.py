@@ -159,10 +159,10 @@ class _JointOutput(_Reaction):
         body = element.bodies[min(1, len(element.bodies) - 1)] if self.body is None else self.body
         index = [GROUND, *mechanism.bodies].index
         frame = {"global": None, "body": body}.get(self.frame, self.frame)
-        point_: Any = forces.point_of(self.joint, index(body)) if point is None else point
+        center: Any = forces.point_of(self.joint, index(body)) if point is None else point
 
         def component_of(forces: MotionForces) -> Numbers:
-            return forces.reaction(self.joint, index(body), None if frame is None else index(frame), point_)[row]
+            return forces.reaction(self.joint, index(body), None if frame is None else index(frame), center)[row]
 
         return component_of(forces) if isinstance(element, AbstractForce) else forces.unique(component_of, size)
 
