@@ -114,14 +114,14 @@ def noise(times: Float[np.ndarray, " samples"], values: Float[np.ndarray, " samp
     scaled to weights of unit norm, keep its standard deviation. The estimate is the least over the orders.
     """
     floor = float(np.abs(values).max()) * np.finfo(float).eps / 4
-    estimate = math.inf
+    estimate, weights = math.inf, np.ones((len(times), 1))
+    since = (times - times[0]) * ((len(times) - 1) / (times[-1] - times[0])) if len(times) > 1 else times
     for order in range(1, min(12, len(times) - 1)):
-        windows = np.lib.stride_tricks.sliding_window_view(times, order + 1)
-        gaps = windows[:, :, None] - windows[:, None, :] + np.eye(order + 1)
-        weights = 1 / np.prod(gaps / (windows[:, -1:, None] - windows[:, :1, None]), axis=2)
-        weights = weights / np.sqrt((weights**2).sum(axis=1, keepdims=True))
+        weights = np.pad(weights[1:], ((0, 0), (1, 0))) - np.pad(weights[:-1], ((0, 0), (0, 1)))
+        weights /= (since[order:] - since[:-order])[:, None]
         samples = np.lib.stride_tricks.sliding_window_view(values, order + 1)
-        estimate = min(estimate, float(np.sqrt(((weights * samples).sum(axis=1) ** 2).mean())))
+        differences = (weights * samples).sum(axis=1) / np.sqrt((weights**2).sum(axis=1))
+        estimate = min(estimate, float(np.sqrt((differences**2).mean())))
     return max(floor, estimate) if math.isfinite(estimate) else floor
 
 

@@ -123,6 +123,20 @@ def test_the_jerk_is_that_of_the_motion(name, noise, rate):
     assert motion.stop == times[-1]
 
 
+@pytest.mark.parametrize("periods", [10, 20, 40, 80])
+@pytest.mark.parametrize("count", [501, 2501])
+def test_many_periods_are_no_noise(count, periods):
+    if count < 25 * periods:
+        pytest.skip("too few samples for a jerk")
+    times, rate = np.linspace(0.0, 5.0, count), 2 * np.pi * periods / 5
+    values = 0.5 * np.sin(rate * times + 1) + 2e-5 * np.random.default_rng(periods).normal(size=count)
+    _, law, found = law_of(times, values, 2e-4)
+    assert found.noise == pytest.approx(2e-5, rel=0.2)
+    inner = times[(times > 0.5) & (times < 4.5)]
+    jerk = -0.5 * rate**3 * np.cos(rate * inner + 1)
+    assert np.sqrt(np.mean((derivative(law, inner, 3) - jerk) ** 2)) < 0.05 * 0.5 * rate**3
+
+
 def test_a_deviation_below_the_noise_is_kept_where_it_can_be():
     times = np.linspace(0, 3, 601)
     values = np.sin(2 * times) + 1e-4 * np.random.default_rng(2).normal(size=601)

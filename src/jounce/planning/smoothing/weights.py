@@ -17,12 +17,14 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.planning.smoothing.bases import DEGREE, PENALIZED, penalty_root, values_at, whole
+from jounce.planning.smoothing.dwells import noise_of
 
 CELLS = (8, 16, 32, 64)  # of an interval: the fewest that resolve the cutoff frequency, as rounding grows with them
 MOST, LEAST = 3000, 64  # samples in an interval
 RESOLVED = np.pi / 2  # largest cutoff frequency times the length of a cell
 RANGE = (-24.0, 20.0)  # of the natural logarithm of the weight, for cells of length 1
 STEPS, FINE, REFINED = 24, 9, 2  # weights of the first grid, weights of each refinement, and number of refinements
+EXCESS = 3.0  # largest plausible ratio to the noise that differences of samples show
 FLOOR = 1e-7  # fraction of the range of samples: smaller noise counts as zero
 
 
@@ -70,12 +72,17 @@ def interval_estimates(
 
 
 def _resolved(times: np.ndarray, values: np.ndarray) -> tuple[IntervalEstimate, bool]:
-    """Return the estimate with the fewest cells that resolve the cutoff frequency, and whether any do."""
+    """Return the estimate with the fewest cells that resolve the motion, and whether any do.
+
+    A motion too fast for the cells counts as noise with a low cutoff frequency, so that both the cutoff frequency and
+    the noise must be plausible.
+    """
+    likely = EXCESS * max(noise_of(times, values), FLOOR * float(np.ptp(values)))
     counts = [min(cells, len(times) - 1) for cells in CELLS]
     estimate = _estimate(times, values, counts[0])
     for k, cells in enumerate(counts):
         estimate = _estimate(times, values, cells) if k else estimate
-        if estimate.cutoff * (estimate.stop - estimate.start) <= RESOLVED * cells:
+        if estimate.cutoff * (estimate.stop - estimate.start) <= RESOLVED * cells and estimate.noise <= likely:
             return estimate, True
     return estimate, False
 
