@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# gtsam 4.3.0: a CumulativeSplineTrajectory of rotations rests elsewhere than its control points, by 105 degrees here, and
-# its derivative is not an angular velocity.
+# gtsam 4.3.0: a CumulativeSplineTrajectory of rotations rests elsewhere than its control points, by 105 degrees here,
+# and its derivative is not an angular velocity.
 #
-# A cumulative B-spline on a Lie group multiplies the exponentials of its weighted increments, so that a trajectory whose
-# last control points are equal comes to rest there. One would expect the same of this class, whose header cites such a
-# spline. It adds all increments since the first control point in one exponential: turns about different axes, which do
-# not commute, take the trajectory away from all later control points, for rotations and poses. Given a window of time
-# (windowStart, windowEnd), the sum begins at another control point: the same instant has another pose. The derivative is
-# that of the sum, not the angular velocity. There is no message; the documentation gives the formula of the sum. Output
-# seen: "at rest 104.8 degrees from the last four control points, 0.0 with a window; derivative 0.771, angular velocity
-# 0.746 rad/s". Exits with 1 if that is no longer so.
+# A cumulative B-spline on a Lie group multiplies the exponentials of its weighted increments, so that a trajectory
+# whose last control points are equal comes to rest there. One would expect the same of this class, whose header cites
+# such a spline. It adds all increments since the first control point in one exponential: turns about different axes,
+# which do not commute, take the trajectory away from all later control points, for rotations and poses. Given a window
+# of time (windowStart, windowEnd), the sum begins at another control point: the same instant has another pose. The
+# derivative is that of the sum, not the angular velocity. There is no message; the documentation gives the formula of
+# the sum. Output seen: "at rest 104.8 degrees from the last four control points, 0.0 with a window; derivative 0.771,
+# angular velocity 0.746 rad/s". Exits with 1 if that is no longer so.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

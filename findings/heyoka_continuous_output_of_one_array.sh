@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # heyoka 7.13.2: values of a continuous output at single times are all one array: a list of them is the last one, often.
 #
-# propagate_until(..., c_output=True) returns the solution as a function of time, as dense_output=True of SciPy does. One
-# would expect a new array from each call. For one time, the call returns a view of memory that the next call writes to:
-# [solution(t) for t in times] has the last state in every row, and the difference of two states is zero. The same holds
-# of update_d_output of an integrator. Given an array of times, a call returns new memory. There is no message. Output
-# seen for sin t: "at 1, 2, 3 s, one by one: 0.141 0.141 0.141; in one call: 0.841 0.909 0.141". Exits with 1 if that is no
-# longer so.
+# propagate_until(..., c_output=True) returns the solution as a function of time, as dense_output=True of SciPy does.
+# One would expect a new array from each call. For one time, the call returns a view of memory that the next call writes
+# to: [solution(t) for t in times] has the last state in every row, and the difference of two states is zero. The same
+# holds of update_d_output of an integrator. Given an array of times, a call returns new memory. There is no message.
+# Output seen for sin t: "at 1, 2, 3 s, one by one: 0.141 0.141 0.141; in one call: 0.841 0.909 0.141". Exits with 1 if
+# that is no longer so.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

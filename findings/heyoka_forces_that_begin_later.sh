@@ -2,12 +2,13 @@
 # heyoka 7.13.2: a ball falls through a spring that is written with relu; a mass at rest never meets a force by select.
 #
 # relu and select make expressions that depend on a condition, for stops, contacts and pulses. One would expect the step
-# control to notice that the right-hand side changes within a step, as that of SciPy 1.17.1 does, or a refusal. A step is
-# chosen by the Taylor series at its start, which knows nothing of what begins later: a free fall is a polynomial, so that
-# one step reaches the end, 3.9 m below the spring; a mass at rest stays there for all forces of later times. The outcome
-# is that the time limit was reached, without a message. With a terminal event at the change, which ends a step there and
-# lets the simulation go on, the ball bounces. Output seen after 1 s of a fall from 1 m onto 10 kN/m: "heyoka -3.905 m in
-# 1 step, with an event 0.9792 m, SciPy 0.9792 m; mass at rest: 0 m, SciPy 1.416 m". Exits with 1 if that is no longer so.
+# control to notice that the right-hand side changes within a step, as that of SciPy 1.17.1 does, or a refusal. A step
+# is chosen by the Taylor series at its start, which knows nothing of what begins later: a free fall is a polynomial, so
+# that one step reaches the end, 3.9 m below the spring; a mass at rest stays there for all forces of later times. The
+# outcome is that the time limit was reached, without a message. With a terminal event at the change, which ends a step
+# there and lets the simulation go on, the ball bounces. Output seen after 1 s of a fall from 1 m onto 10 kN/m: "heyoka
+# -3.905 m in 1 step, with an event 0.9792 m, SciPy 0.9792 m; mass at rest: 0 m, SciPy 1.416 m". Exits with 1 if that is
+# no longer so.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

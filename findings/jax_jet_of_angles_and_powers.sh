@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # JAX 0.10.2: jax.experimental.jet gives NaN for an angle of arctan2 on the y axis, and for x**3.0 at x <= 0.
 #
-# jet computes Taylor series of smooth functions. One would expect the derivatives that nested jax.jvp gives. The rule of
-# arctan2 divides y by x: at the top of its circle, where x is 0, a crank has an angle and no derivatives. The rule of
-# powers takes the logarithm of the base: for a float exponent, all derivatives are NaN where the base is negative or 0,
-# also where the exponent is a whole number and each derivative by jax.jvp is right; for x**3 they are right. There is no
-# message, and the values themselves are right. Output seen: "arctan2(1 + x, x) at 0: 1.571 nan nan, by jvp 1.571 -1 2;
-# x**3.0 at -2: -8 nan nan, by jvp -8 12 -12". Exits with 1 if that is no longer so.
+# jet computes Taylor series of smooth functions. One would expect the derivatives that nested jax.jvp gives. The rule
+# of arctan2 divides y by x: at the top of its circle, where x is 0, a crank has an angle and no derivatives. The rule
+# of powers takes the logarithm of the base: for a float exponent, all derivatives are NaN where the base is negative or
+# 0, also where the exponent is a whole number and each derivative by jax.jvp is right; for x**3 they are right. There
+# is no message, and the values themselves are right. Output seen: "arctan2(1 + x, x) at 0: 1.571 nan nan, by jvp 1.571
+# -1 2; x**3.0 at -2: -8 nan nan, by jvp -8 12 -12". Exits with 1 if that is no longer so.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -39,7 +39,10 @@ def cube(x):
     return x**3.0
 
 
-cases = {"arctan2(1 + x, x) at 0": (angle, 0.0, [np.pi / 2, -1.0, 2.0]), "x**3.0 at -2": (cube, -2.0, [-8.0, 12.0, -12.0])}
+cases = {
+    "arctan2(1 + x, x) at 0": (angle, 0.0, [np.pi / 2, -1.0, 2.0]),
+    "x**3.0 at -2": (cube, -2.0, [-8.0, 12.0, -12.0]),
+}
 print("jax", jax.__version__)
 found = []
 for name, (f, x, right) in cases.items():

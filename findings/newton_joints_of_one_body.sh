@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # Newton 1.8.0: of the joints of one body in MJCF, all have the place of the first, and slides come before hinges.
 #
-# MJCF lists the joints of a body in the order in which they move it, each with an axis and a pos of its own; a slide after
-# a hinge moves along an axis that the hinge has turned. One would expect add_mjcf to place bodies where MuJoCo 4.0.0 does,
-# or to refuse what its joints cannot do. It makes one joint of them, at the pos of the first, whose slides are its first
-# coordinates, along fixed axes: a second hinge at another place turns about the wrong axis, and a polar arm (a hinge and
-# a slide) extends in one direction at any angle, with its coordinates in the other order. <option gravity> is left out as
-# well. There is no message. Output seen: "second hinge: Newton 0 0 0, MuJoCo 0 0.1168 0.02368; polar arm: Newton 0 0 0.4,
-# MuJoCo 0.1918 0 0.351; gravity: Newton -9.81, MuJoCo -5". Exits with 1 if that is no longer so.
+# MJCF lists the joints of a body in the order in which they move it, each with an axis and a pos of its own; a slide
+# after a hinge moves along an axis that the hinge has turned. One would expect add_mjcf to place bodies where MuJoCo
+# 4.0.0 does, or to refuse what its joints cannot do. It makes one joint of them, at the pos of the first, whose slides
+# are its first coordinates, along fixed axes: a second hinge at another place turns about the wrong axis, and a polar
+# arm (a hinge and a slide) extends in one direction at any angle, with its coordinates in the other order. <option
+# gravity> is left out as well. There is no message. Output seen: "second hinge: Newton 0 0 0, MuJoCo 0 0.1168 0.02368;
+# polar arm: Newton 0 0 0.4, MuJoCo 0.1918 0 0.351; gravity: Newton -9.81, MuJoCo -5". Exits with 1 if that is no longer
+# so.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

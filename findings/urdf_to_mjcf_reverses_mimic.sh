@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # urdf-to-mjcf 0.1.1: <mimic> is reversed: the leader follows; products of inertia are dropped.
 #
-# <mimic joint="finger" multiplier="0.5" offset="0.1"/> of "follower" means follower = 0.5 finger + 0.1. In MJCF that is an
-# equality with the follower as joint1, as MuJoCo 4.0.0 makes it of the same URDF. One would expect the converter to write
-# the same. It writes the leader as joint1: finger = 0.5 follower + 0.1, so that the follower turns four times as far; only
-# with the multiplier 1 and the offset 0 this is the same. Of an <inertia>, the diagonal is written alone: the moment
-# about a slanted axis is another. There is no message. Output seen: "finger at 0.4: follower at 0.3 rad in MuJoCo, 0.6
-# rad after conversion; product of inertia: 0.02 and 0 kg m^2". Exits with 1 if that is no longer so.
+# <mimic joint="finger" multiplier="0.5" offset="0.1"/> of "follower" means follower = 0.5 finger + 0.1. In MJCF that is
+# an equality with the follower as joint1, as MuJoCo 4.0.0 makes it of the same URDF. One would expect the converter to
+# write the same. It writes the leader as joint1: finger = 0.5 follower + 0.1, so that the follower turns four times as
+# far; only with the multiplier 1 and the offset 0 this is the same. Of an <inertia>, the diagonal is written alone: the
+# moment about a slanted axis is another. There is no message. Output seen: "finger at 0.4: follower at 0.3 rad in
+# MuJoCo, 0.6 rad after conversion; product of inertia: 0.02 and 0 kg m^2". Exits with 1 if that is no longer so.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -74,7 +74,8 @@ products = [product_of_inertia(read), product_of_inertia(converted)]
 
 versions = (f"{name} {importlib.metadata.version(name)}" for name in ("urdf-to-mjcf", "mujoco"))
 print(*versions, sep=", ")
-print(f"finger at {finger}: follower at {followers[0]:.3g} rad in MuJoCo, {followers[1]:.3g} rad after conversion;", end=" ")
+print(f"finger at {finger}: follower at {followers[0]:.3g} rad in MuJoCo,", end=" ")
+print(f"{followers[1]:.3g} rad after conversion;", end=" ")
 print(f"product of inertia: {products[0]:.3g} and {abs(products[1]):.3g} kg m^2")
 messages = pathlib.Path("messages.txt").read_text().lower()
 assert not any(word in messages for word in ("mimic", "inertia", "follower")), messages
