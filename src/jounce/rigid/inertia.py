@@ -12,7 +12,7 @@ from jounce.base.shapes import ArrayLike, Numbers, Real, Refused, by_component, 
 from jounce.errors import JounceError, RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 
-ROUNDING = 1e-5  # of the largest principal moment: error of possible tensors in files with six digits
+ROUNDING = 1e-5  # fraction of the largest principal moment: error of possible tensors in files with six digits
 MOST_SHOWN = 9  # numbers shown in a message
 ADVICE = "check the units, the signs of the products of inertia and the axes"
 WITHOUT_MASS = "has moments of inertia but no mass"

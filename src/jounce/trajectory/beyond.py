@@ -8,8 +8,8 @@ import jax.numpy as jnp
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 
-SLACK = 1e-9  # of the duration, by which rounding may move an instant out of a law
-CLOSED = 1e-9  # of the range of a law, within which it ends at its initial value
+SLACK = 1e-9  # fraction of the duration, by which rounding may move an instant out of a law
+CLOSED = 1e-9  # fraction of the range of a law, within which it ends at its initial value
 
 
 def check_within(first: float, last: float, start: float, stop: float, subject: str) -> None:

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from jounce.jet import Jet
 from jounce.trajectory.motion import AbstractMotion, SplineMotion
 
-SMOOTH = 1e-9  # of the peak of a derivative; smaller jumps are rounding
+SMOOTH = 1e-9  # fraction of the peak of a derivative; smaller jumps are rounding
 INSTANTS = 33  # samples of a law without known pieces, for these peaks
 
 Jumps = tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"]]

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 INTERPOLATION_SAFETY, NOISE_SAFETY = 2.0, 3.0
-TOLERANCE = 0.1  # of an error relative to the peak of its derivative
+TOLERANCE = 0.1  # largest error of a supported derivative, relative to its peak
 BLOCKS, BLOCK = 8, 2500  # parts of very many samples, and samples in each
 
 

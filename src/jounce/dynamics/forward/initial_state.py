@@ -28,7 +28,7 @@ from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE, HostJacobian, is
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.building.builder import with_reference
 
-TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
+TOLERANCE = 1e-12  # tolerance of the assembled positions, rad or sizes of the mechanism
 ROUNDING = 1e-15  # of residuals, rad or sizes of the mechanism
 LARGEST_CHANGE = 1e-2  # relative change of velocities within the uncertainty of the position by rounding
 

@@ -35,8 +35,8 @@ from jounce.rigid.pose import Pose
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of friction, at which the sign of the determinant is checked
 STEPS = 30  # of Newton's method; four or five suffice far from locking
 RAMP, EACH = 16, 6  # of the continuation: number of increments of friction, and of Newton steps for each
-CLOSE = 1e-15  # of the largest normal force: a smaller change is rounding
-ROUNDING = 1e-14  # of the largest multiplier: rounding of the torque loss of lossless gears
+CLOSE = 1e-15  # fraction of the largest normal force: a smaller change is rounding
+ROUNDING = 1e-14  # fraction of the largest multiplier: rounding of the torque loss of lossless gears
 
 NormalForces = Float[Numbers, "joint batch"]
 

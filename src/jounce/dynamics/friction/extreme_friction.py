@@ -30,7 +30,7 @@ LOADS = 4  # random loads, where no normal force acts without friction
 HALVINGS = 45  # bisections for the share of friction at which it locks
 LOCKED = 1e12  # times the normal force without friction: only rounding gives more, where friction locks
 LARGE = 1e6  # times the friction without locking: counts as infinite
-CONCAVE = 1e-11  # of the largest curvature: less is rounding
+CONCAVE = 1e-11  # fraction of the largest curvature: less is rounding
 ALONG = 1e-8  # rad: tolerance of the optimal direction of friction
 SMALLEST = 1e-150  # N: smaller normal forces count as zero
 

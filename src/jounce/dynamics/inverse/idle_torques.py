@@ -9,7 +9,7 @@ from jounce.constraints.spin_hold import SpinHold
 from jounce.errors import MechanismError
 from jounce.kinematics import Status
 
-NOTHING = 1e-9  # of the largest multiplier: less is rounding
+NOTHING = 1e-9  # fraction of the largest multiplier: less is rounding
 
 
 def checked(forces: Any) -> Any:

@@ -13,7 +13,7 @@ from jounce.errors import SolveError
 from jounce.kinematics import Motion, Status
 from jounce.mechanism.system import Group, System, with_field
 
-NONE = 1e-12  # of the largest normal force: less is rounding
+NONE = 1e-12  # fraction of the largest normal force: less is rounding
 
 
 def friction_left_out(group: Group) -> Group:

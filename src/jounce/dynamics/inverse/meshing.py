@@ -22,7 +22,7 @@ from jounce.mechanism.system import Group, movable, with_field
 
 FAR = 300.0  # times the distance of crossed axes: larger radii are no gears, but numbers in mm without a unit
 LEAD = math.radians(0.5)  # largest rounding of a lead angle that is given to friction
-OFF_PITCH = 1e-6  # of the pitch radius: farther from the pitch line, a wheel does not mesh
+OFF_PITCH = 1e-6  # fraction of the pitch radius: farther from the pitch line, a wheel does not mesh
 
 
 def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable[..., Any]) -> None:

@@ -29,7 +29,7 @@ from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import Group, law_left_out
 from jounce.mechanism.transmissions.axis_angles import angles_of, of_one_lane
 
-NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
+NOTHING = 1e-9  # fraction of the largest multiplier: less is rounding
 
 
 class MotionForces:

@@ -31,7 +31,7 @@ from jounce.mechanism import Model
 from jounce.mechanism.system import System
 
 RowNumbers = Float[np.ndarray, " row"]
-OPEN = 1e-7  # of the largest undetermined force: less is rounding
+OPEN = 1e-7  # fraction of the largest undetermined force: less is rounding
 
 
 def least_multipliers(

@@ -25,7 +25,7 @@ from jounce.mechanism.system import Group, with_field
 Flanks = Mapping[int, Float[Numbers, "instance time"]]
 """For each group index, 1 or -1 for each pair of teeth."""
 
-NONE = 1e-11  # of the largest multiplier, or of its largest scaled rate: less is rounding
+NONE = 1e-11  # fraction of the largest multiplier, or of its largest scaled rate: less is rounding
 SLOWEST = 1e-3  # 1/s: lower bound of the rate of motions in scales of rates
 MOST_CHANGES = 8  # iterations of flanks, if multipliers of redundant constraints depend on them
 MOST_LISTED = 4  # instants

@@ -29,7 +29,7 @@ ACCELERATION = 2
 EFFORTS = (4, 5)  # fields that follow from dynamics
 ORDER = 3  # of the motion: jerk, and with it the rate of the torque
 
-REST = 1e-9  # of the largest velocity of a joint: a slower joint is at rest
+REST = 1e-9  # fraction of the largest velocity of a joint: a slower joint is at rest
 INSTANTS = 2000  # least number over the trajectory
 BETWEEN = 4  # least number of intervals between two instants of the trajectory
 POINTS = 9  # instants around each peak

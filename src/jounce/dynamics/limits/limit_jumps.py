@@ -11,9 +11,9 @@ from jounce.trajectory.law_checks.seen_jumps import level_sizes
 from jounce.trajectory.law_checks.smoothness import LeaderValues, known_jumps
 from jounce.trajectory.laws.stacking import law_derivatives
 
-SMALL = 1e-9  # of the largest value of a derivative: a smaller jump is rounding
-NONE = 1e-12  # of the largest torque at the jump: a smaller change is rounding
-SAME = 1e-9  # of the duration: instants nearer to each other, or to an end, are one
+SMALL = 1e-9  # fraction of the largest value of a derivative: a smaller jump is rounding
+NONE = 1e-12  # fraction of the largest torque at the jump: a smaller change is rounding
+SAME = 1e-9  # fraction of the duration: instants nearer to each other, or to an end, are one
 EFFORT, EFFORT_RATE = 4, 5  # indices of quantities
 
 

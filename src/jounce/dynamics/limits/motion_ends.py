@@ -13,15 +13,18 @@ from jounce.trajectory import JointTrajectory, SplineMotion
 from jounce.trajectory.law_checks.seen_jumps import level_sizes
 
 ORDER = 3  # up to jerk
-SMALL = 1e-6  # of the size of a derivative: less is rest
+SMALL = 1e-6  # fraction of the size of a derivative: a smaller value is rest
 LEAST = np.array([0.0, 1e-9, 1e-6, 1e-3])  # absolute thresholds of rest by order, rad or m by s^order
 LOOKS = 201  # instants that show the sizes of derivatives
-INSIDE = 1e-10  # of the duration: distance of the additional instant before the stop
-UNSUPPORTED = 0.5  # of its peak: error above which samples do not support a derivative
-SAFE = 3.0  # times the estimated error: less is rest
-SLOW, FAR = 0.02, 4.0  # of the largest velocity, and of standard deviations: less is rest for noisy samples
+INSIDE = 1e-10  # fraction of the duration: distance of the additional instant from the stop
+UNSUPPORTED = 0.5  # relative error of a derivative above which samples do not support it
+SAFE = 3.0  # ratio to the estimated error: a smaller value is rest
+SLOW, FAR = (
+    0.02,
+    4.0,
+)  # fraction of the largest velocity, and standard deviations: less is rest for noisy samples
 FITTED, PART = 12, 20  # samples of a fit at an end: at least this number, or one in so many
-FEW = 2  # times the degree: with fewer samples, the spline and not noise decides the derivatives
+FEW = 2  # ratio of samples to degree below which the spline, not noise, determines the derivatives
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-SYMMETRIC = 1e-9  # of a matrix: a smaller asymmetry is rounding
+SYMMETRIC = 1e-9  # fraction of a matrix: a smaller asymmetry is rounding
 EPSILON = np.finfo(float).eps
-REAL = 1e-9  # of an eigenvalue: a smaller imaginary part is rounding
+REAL = 1e-9  # fraction of an eigenvalue: a smaller imaginary part is rounding
 
 Square = Float[np.ndarray, "coordinate coordinate"]
 

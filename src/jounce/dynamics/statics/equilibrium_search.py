@@ -25,9 +25,9 @@ MAX_STEPS = 300
 LONGEST = 0.25  # rad or sizes of the mechanism: bound of a step
 ADRIFT = 50  # longest steps in a row without resisting stiffness, after which the search has diverged
 CLOSED = 1e-11  # rad or sizes of the mechanism: a shorter step ends the search
-BALANCED = 1e-9  # of the loads: largest residual of an equilibrium
-FLAT = 1e-10  # of the stiffness: less counts as zero in a step
-WORTH = 1e-14  # of the loads: less is rounding
+BALANCED = 1e-9  # fraction of the loads: largest residual of an equilibrium
+FLAT = 1e-10  # fraction of the stiffness: less counts as zero in a step
+WORTH = 1e-14  # fraction of the loads: less is rounding
 
 
 class SearchResult(NamedTuple):

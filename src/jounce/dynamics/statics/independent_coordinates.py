@@ -22,10 +22,10 @@ from jounce.mechanism.building.element_indices import element_indices
 from jounce.mechanism.laws.driver_outputs import is_turning
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "turn_x", "turn_y", "turn_z")}
-TIE = 0.99  # of the best candidate: equally good coordinates are taken in the order of the mechanism
+TIE = 0.99  # fraction of the best candidate: equally good coordinates are taken in the order of the mechanism
 SHIFT = 0.9  # weight of shifts relative to rotations in the choice of coordinates: angles read better
-NOWHERE = 1e-8  # of the largest force: less is balanced
-ROUNDING = 1e-12  # of the sum of the absolute values of all terms
+NOWHERE = 1e-8  # fraction of the largest force: less is balanced
+ROUNDING = 1e-12  # fraction of the sum of the absolute values of all terms
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from jounce.dynamics.statics.variations import sizes_of_forces
 
 STEPS = (1e-4, 1e-6)  # rad or sizes of the mechanism, and as much by s
 BENT = 0.1  # share of the difference of slopes that remains at a kink with the shorter step
-FAINT = 1e-6  # of the slope: a smaller difference of slopes is rounding
-COUNTS = 1e-9  # of the stiffness: a smaller difference of slopes does not matter
+FAINT = 1e-6  # fraction of the slope: a smaller difference of slopes is rounding
+COUNTS = 1e-9  # fraction of the stiffness: a smaller difference of slopes does not matter
 
 
 def kinked(reduction: Reduction) -> list[str]:

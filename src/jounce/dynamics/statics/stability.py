@@ -6,7 +6,7 @@ import numpy as np
 
 from jounce.dynamics.statics.eigenmodes import EPSILON, Square, eigenmodes, is_symmetric
 
-DECAY = 1e-9  # of the fastest rate: slower growth is rounding
+DECAY = 1e-9  # fraction of the fastest rate: slower growth is rounding
 
 
 class Verdict(NamedTuple):

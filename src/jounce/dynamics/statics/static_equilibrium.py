@@ -33,7 +33,7 @@ from jounce.robot import Robot
 from jounce.robot.closed_loops.closures import GivenCoordinates
 
 METHODS = ("settle", "newton")
-SLIGHT = 1e-9  # of the largest tension of a rope: less is rounding
+SLIGHT = 1e-9  # fraction of the largest tension of a rope: less is rounding
 SINGULAR = "the position is singular, joints can move there that cannot elsewhere; positions nearby are not examined"
 
 

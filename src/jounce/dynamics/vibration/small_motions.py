@@ -27,7 +27,7 @@ from jounce.mechanism.building.preconditions import concrete
 from jounce.mechanism.transmissions.axis_angles import of_one_lane
 from jounce.robot import Robot
 
-INSTANT = 1e-9  # of the duration of a motion: a requested instant this near to one of the motion is that one
+INSTANT = 1e-9  # fraction of the duration of a motion: a requested instant this near to one of the motion is that one
 
 
 @concrete

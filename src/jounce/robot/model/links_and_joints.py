@@ -65,7 +65,7 @@ class Limits:
 
 
 UNLIMITED = Limits()
-POINT = 1e-4  # of the narrowest range: what ranges have in common, if it is as little, is meant to be one point
+POINT = 1e-4  # fraction of the narrowest range: a smaller common part of ranges is meant to be one point
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from jounce.trajectory.law_checks.smoothness import HIGHEST, LeaderValues, known
 from jounce.trajectory.laws.composed import FollowingMotion
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion
 
-SIDE_OFFSET = 2e-11  # of a span of time: how far beside a break its sides are; kinks are found to half of that
+SIDE_OFFSET = 2e-11  # fraction of an interval: distance of the sides from a break; kinks are found to half of that
 MOST = 1000  # breaks of the derivative above the requested ones; of more, as of a spline through samples, none is used
 
 Times = Float[np.ndarray, " time"]

@@ -16,8 +16,8 @@ from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMot
 from jounce.units.expression import Expression
 
 SMOOTH = frozenset("+ - * pos neg sin cos exp sinh cosh tanh atan".split())  # operations without kinks, jumps and poles
-HIGHEST_SEEN = 5  # derivative whose jumps are looked for: that above jounce; rounding hides those of higher ones
-TERMS = 3  # of series, above that derivative
+HIGHEST_SEEN = 5  # highest derivative whose jumps are sought, that above jounce: rounding hides those of higher ones
+TERMS = 3  # number of terms of series above that derivative
 
 
 def may_bend(law: Any) -> bool:

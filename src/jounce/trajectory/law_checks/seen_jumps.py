@@ -12,31 +12,31 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-LOOKS = 2001  # at a law, between which cells are halved
-BENT = 0.2  # of the change over a cell: what the slopes do not account for, where it is a jump
-FAINT = 1e-5  # of the largest value: a smaller jump is none
-SLIGHT = 1e-7  # of a derivative nearby: a smaller jump is none
-CONSTANT = 1e-9  # of the size of the positions, by a share of the time to the power of the order: their rounding
-FASTEST = 0.01  # this share
-RESOLVED = 1e-3  # of a derivative: what the last terms of a series are where it counts
-SHORTEST = 1e-11  # of the whole time: cells in which a jump is still one
-USUAL = 0.998  # of the instants: what is larger at the others is beside a pole
-LOST = 2  # halvings in succession that show nothing but rounding
-STEPPED = 4  # that show a jump
-HALVINGS = 30  # of a stretch in which positions jump
-END = 1e-14  # of the whole time: so near to the end of a stretch is there
-SHOWN = 0.5, 3.0  # of a jump: what of it the nearest values on both sides show, at least and at most
-ONE_SIDE = 0.01  # of how far apart two sides are: so near to one of them is what belongs to it
+LOOKS = 2001  # instants at which a law is evaluated first; the cells between them are halved
+BENT = 0.2  # fraction of the change over a cell: at a jump, the slopes at both ends leave more unexplained
+FAINT = 1e-5  # fraction of the largest value: smaller changes are no jumps
+SLIGHT = 1e-7  # fraction of the values nearby: smaller differences are no jumps
+CONSTANT = 1e-9  # fraction of the positions over a time scale to the power of the order: rounding of a derivative
+FASTEST = 0.01  # this time scale, as a fraction of the duration
+RESOLVED = 1e-3  # largest fraction of the last terms in a series that is accurate
+SHORTEST = 1e-11  # fraction of the duration: cells this short are not halved
+USUAL = 0.998  # quantile of the positions that gives their size: larger values lie beside a pole
+LOST = 2  # successive halvings that show only rounding, after which a cell is given up
+STEPPED = 4  # successive halvings that show a jump, after which it is certain
+HALVINGS = 30  # bisections for the instant of a jump of positions
+END = 1e-14  # fraction of the duration: an instant this near to an end of a cell is that end
+SHOWN = 0.5, 3.0  # least and largest ratio of the difference of the nearest values on both sides to a jump
+ONE_SIDE = 0.01  # fraction of the gap between two series: a value this near to one of them belongs to its side
 MOST = 40_000  # cells at a time
-HIDDEN = 0.01  # of the whole time: what rounding may hide of positions
-BLURRED = 1e-3  # of the whole time: about a jump of a derivative, none of a higher one is seen
-FARTHEST = 1 / 4  # of the whole time: how far a side is from what it is a side of, at most
-STRIDE = 1.9  # times the distance of a side is that of the next: where it is a power of two, rounding is the same
-LIMITS = (1e-6, 1e-3, 1e-2)  # of a derivative: by how much four sides in succession may differ about a limit
-FURTHER = 6  # sides in succession over which an infinite derivative
+HIDDEN = 0.01  # fraction of the duration in which rounding may hide jumps of positions
+BLURRED = 1e-3  # fraction of the duration: this near to a jump of a derivative, jumps of higher ones are not seen
+FARTHEST = 1 / 4  # fraction of the duration: largest distance of a side from a jump
+STRIDE = 1.9  # ratio of the distances of successive sides; with a power of two, their rounding would be the same
+LIMITS = (1e-6, 1e-3, 1e-2)  # fractions of a derivative by which four successive sides may differ about a limit
+FURTHER = 6  # successive sides over which an infinite derivative
 GROWTH = 1.02  # becomes smaller by more than this factor
-CLEAR = 4  # times the last terms of series they differ, where they do
-MARGIN = 10  # times an error is no jump
+CLEAR = 4  # ratio of a gap to the last terms of series, above which the series differ
+MARGIN = 10  # ratio of a change to its error, above which it is a jump
 
 Evaluation = Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, "time level joint"]]
 
@@ -47,11 +47,11 @@ class SeenJumps(NamedTuple):
     Attributes
     ----------
     instants : array of shape (jump,)
-        In their sequence, s.
+        Increasing instants, s.
     sizes : array of shape (jump, order + 1, joint)
-        By how much each derivative jumps: infinite where it has no limit on a side, 0 where it does not jump.
+        Jump of each derivative: infinite where it has no limit on a side, 0 where it does not jump.
     everywhere : bool
-        Whether all of the time could be looked at: what varies too fast could not.
+        Whether all of the interval was examined, as a law may vary too fast in a part of it.
     """
 
     instants: Float[np.ndarray, " jump"]

@@ -20,13 +20,16 @@ from jounce.trajectory.motion import AbstractMotion, SplineMotion
 HIGHEST = 10  # highest derivative that is examined
 MOST_CROSSINGS = 10_000
 INTERVALS = 4000  # samples of a leader, for its passages of knots of the law that follows it
-STEPS = 24  # most refinements of a passage between two samples, down to rounding
-AMONG, CLOSE = np.arange(1, 8) / 8, 10.0 ** -np.arange(2, 16, 2)  # shares of the interval that are evaluated together
-SLACK = 1e-6  # of the sampling interval, by which a passage may be beyond an end
+STEPS = 24  # largest number of refinements of a passage between two samples, down to rounding
+AMONG, CLOSE = (
+    np.arange(1, 8) / 8,
+    10.0 ** -np.arange(2, 16, 2),
+)  # fractions of an interval evaluated together
+SLACK = 1e-6  # fraction of the sampling interval by which a passage may be beyond an end
 LOOKED = "its kinks and jumps are those seen between 2000 instants"
 TOO_FAST = "it varies too fast for all of its kinks and jumps to be seen"
-SAME = 1e-7  # of the time: seen jumps this near to a known one are the known one
-ROUNDING = 1e-9  # of the rise of a profile over its duration to the power of the order; smaller jumps are ignored
+SAME = 1e-7  # fraction of the duration: observed jumps this near to a known one are that one
+ROUNDING = 1e-9  # fraction of the rise of a profile over powers of its duration: smaller jumps are rounding
 
 
 @dataclasses.dataclass(frozen=True)

@@ -25,13 +25,13 @@ from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionM
 INSTANTS = 201
 TURN = 2 * math.pi
 MANY_TURNS = 2 * TURN  # a larger value without a unit is rarely in rad
-AT_REST = 0.05  # of the fastest step: largest first or last step of a motion from rest to rest
-DWELL = 0.03  # of the run: least duration of rest of a position
+AT_REST = 0.05  # fraction of the fastest step: largest first or last step of a motion from rest to rest
+DWELL = 0.03  # fraction of the run: least duration of rest of a position
 ROUND = 1e-7  # relative tolerance of round values
 ENDLESS = 1e300  # larger values are no angles, and sums overflow
 NEAR = 1e-3  # tolerance of the largest value of a law as a whole or half number
 OUTSIDE = 2.0  # largest plausible ratio to the limits of a joint
-SLACK = 0.05  # of a range of degrees, by which limits may be violated
+SLACK = 0.05  # fraction of a range of degrees, by which limits may be violated
 
 Values = Float[np.ndarray, " instants"]
 _OPERATIONS: dict[str, Any] = {

@@ -25,13 +25,13 @@ from jounce.units.expression import Expression
 
 HIGHEST = 4  # highest derivative that may be given: jounce
 PANELS = 1200  # number of panels on either side of the start, each with a polynomial
-DEGREE = 15  # of the polynomial through the derivative on a panel
-RESOLVED = 2e-14  # of the largest value so far: largest error of the polynomial
-FIRST, WIDENED = 1e-3, 0.1  # s, length of the first panel, and growth of panels relative to the way so far
+DEGREE = 15  # degree of the polynomial through the derivative on a panel
+RESOLVED = 2e-14  # fraction of the largest value so far: largest error of the polynomial
+FIRST, WIDENED = 1e-3, 0.1  # length of the first panel, s, and growth of panels relative to the distance from the start
 NARROWED = tuple(2.0**-k for k in range(16))  # factors of the length that are tried for the next panel
-ROUNDING = 1e-9  # of the largest value: error that may be rounding if no shorter panel is better
+ROUNDING = 1e-9  # fraction of the largest value: an error that may be rounding if no shorter panel is better
 STEEPER = 10.0  # largest ratio of values on the shortest panel to those on the longest at a jump; more at a pole
-SHORTEST = 1e-13  # of the way so far: length of a panel that is accepted unchecked
+SHORTEST = 1e-13  # fraction of the distance from the start: length of a panel that is accepted unchecked
 
 _NODES = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
 _BETWEEN = np.cos(np.pi * np.arange(1, DEGREE + 1) / (DEGREE + 1))

@@ -17,7 +17,7 @@ MAX_CONTINUITY = 10
 ENDS = ("not-a-knot", "natural", "clamped")
 BEYOND = ("refuse", "hold", "continue")
 LARGEST_GROWTH = 1e3  # largest growth of a law between its knots; more comes from an ill-conditioned system
-AT_KNOTS = 1e-6  # of the largest value, by which a law may miss its own knots
+AT_KNOTS = 1e-6  # fraction of the largest value, by which a law may miss its own knots
 SAMPLES = 4  # in each segment, to measure the growth
 
 _Conditions = Mapping[int, float]

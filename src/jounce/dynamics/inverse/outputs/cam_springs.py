@@ -17,7 +17,7 @@ from jounce.mechanism.time import TimeLike
 from jounce.trajectory.law_checks.breaks import with_sides
 
 SHARE = 0.1  # relative change of the spring for its slope
-EXACT = 1e-7  # of the largest contact force: tolerance of the least one
+EXACT = 1e-7  # fraction of the largest contact force: tolerance of the least one
 PEAKS, POINTS, ROUNDS = 3, 15, 5  # maxima that are refined, instants on both sides of each, and rounds of refinement
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from jounce.mechanism import Mechanism
 from jounce.trajectory import FollowingMotion
 
-ROUNDING = 1e-9  # of the largest force
+ROUNDING = 1e-9  # fraction of the largest force
 MOST_SHOWN = 4  # instants
 
 
