@@ -1,1 +1,1 @@
-"""The matrix of constrained motion, the accelerations of what moves freely, and the state it starts from."""
+"""The matrix of constrained motion, the accelerations of free motions, and the states from which they start."""

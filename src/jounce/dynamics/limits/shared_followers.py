@@ -46,7 +46,7 @@ class SharedFollowers:
 
     @property
     def limits(self) -> dict[str, Limits]:
-        """Their limits: of what drives them the joints that they follow have."""
+        """Their limits of motion; the followed joints have those of the drives."""
         return {joint.name: joint.limits for joint in self.joints}
 
     @property
@@ -57,7 +57,7 @@ class SharedFollowers:
         return np.array(lower, float), np.array(upper, float)
 
     def moving(self, columns: list[int]) -> list[int]:
-        """Return which of them move where some coordinates do."""
+        """Return the numbers of the followers that move with some coordinates."""
         return [k for k, row in enumerate(self.weights) if row[columns].any()]
 
     def with_followers(

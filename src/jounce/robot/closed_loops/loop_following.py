@@ -1,4 +1,4 @@
-"""From the pose in which a robot is drawn to the start of its drives, without leaving its assembly."""
+"""Motion of a robot from the pose in which it is drawn to the start of its drives, within one assembly."""
 
 from collections.abc import Iterator
 from itertools import islice, permutations

@@ -1,8 +1,8 @@
-"""Jumps of derivatives that show in their values: for laws of which nothing says where they have any.
+"""Jumps of derivatives found from values of a law, for laws whose breaks are not known.
 
 A law is analytic between its breaks: there, its Taylor series from both ends of a short cell agree. A cell in which
-they do not is halved until they do, or until it is as short as instants can be told apart. What remains is looked at
-from both sides: the series from there lead to the derivatives on either side of it.
+they do not is halved until they do, or until its ends differ by little more than rounding. The remaining cells are
+examined from both sides: series from there give the derivatives on either side of the jump.
 """
 
 import math
@@ -207,10 +207,10 @@ def _unsettled_cells(evaluate: Evaluation, first: float, last: float, order: int
 
 
 class _Halved(NamedTuple):
-    """Cells that are halved: their ends, the derivatives there, how large these are nearby, and what was seen.
+    """Cells that are halved, with their ends, the derivatives there, and the sizes of derivatives nearby.
 
-    `noise` counts how often in succession a derivative in the middle was that of neither end, `steps` how often it was
-    that of one; `done` are those that are not halved any more.
+    `noise` counts the successive halvings in which a derivative in the middle belonged to neither end, `steps` those in
+    which it belonged to one. Cells that are `done` are not halved any more.
     """
 
     low: np.ndarray
@@ -237,7 +237,7 @@ class _Halved(NamedTuple):
 
 
 def _halves(cells: _Halved, evaluate: Evaluation, rough: np.ndarray, meeting: tuple[np.ndarray, ...]) -> _Halved:
-    """Return the halves of all cells that are not done, and the others, in the sequence of time."""
+    """Return the halves of all cells that are not done, and the cells that are, in the sequence of time."""
     gap, remainders, _, from_left, from_right = meeting
     middle = (cells.low + cells.high) / 2
     middle_values = np.full_like(cells.left, np.nan)
@@ -245,12 +245,12 @@ def _halves(cells: _Halved, evaluate: Evaluation, rough: np.ndarray, meeting: tu
     middle_terms = middle_values[:, : gap.shape[1]]
     nearer = np.minimum(np.abs(middle_terms - from_left), np.abs(middle_terms - from_right))
     clear = rough & (CLEAR * remainders <= gap)
-    step, is_other = clear & (nearer <= ONE_SIDE * gap), clear & (nearer > ONE_SIDE * gap)
-    hidden = is_other & (cells.steps >= STEPPED) & ~np.logical_or.accumulate(step, axis=1)
+    step, unassigned = clear & (nearer <= ONE_SIDE * gap), clear & (nearer > ONE_SIDE * gap)
+    hidden = unassigned & (cells.steps >= STEPPED) & ~np.logical_or.accumulate(step, axis=1)
     is_lost = hidden.any(axis=(1, 2))  # something jumps there, but rounding hides the instant
     cells = cells._replace(
-        noise=np.where(is_other, cells.noise + 1, 0),
-        steps=np.where(is_other, 0, cells.steps + step),
+        noise=np.where(unassigned, cells.noise + 1, 0),
+        steps=np.where(unassigned, 0, cells.steps + step),
         done=cells.done | is_lost,
     )
     open_cells = np.flatnonzero(~cells.done)
@@ -265,7 +265,7 @@ def _halves(cells: _Halved, evaluate: Evaluation, rough: np.ndarray, meeting: tu
 
 
 def _rows(cells: _Halved) -> _Cells:
-    """Return cells that stand side by side as one."""
+    """Return neighboring cells joined to one."""
     if not len(cells.low):
         return _Cells(cells.low, cells.high, cells.sizes)
     begins = np.flatnonzero(np.append(True, cells.low[1:] > cells.high[:-1]))
@@ -294,7 +294,7 @@ def _series(values: np.ndarray, step: np.ndarray, order: int) -> tuple[np.ndarra
 
 
 class _Limits(NamedTuple):
-    """What derivatives do at stretches: how they change, 0 where that is unknown, and by how much of it they jump."""
+    """Changes of derivatives over cells, 0 where they are unknown, and the jumps among them."""
 
     changes: np.ndarray
     jumps: np.ndarray
@@ -325,7 +325,7 @@ def _limits(evaluate: Evaluation, cells: _Cells, first: float, last: float) -> _
 
 
 class _Side(NamedTuple):
-    """The limits of derivatives on a side, infinite or NaN where there is none, and what is nearest; their errors."""
+    """Limits of derivatives on a side, infinite or NaN where there is none, the nearest values, and the errors."""
 
     value: np.ndarray
     nearest: np.ndarray
