@@ -65,7 +65,7 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
                 f"no field of {kind.__qualname__} may have this name, which files use for something else; rename it"
             )
             raise MechanismError(message, name="field", value=name)
-    catalogues = [_REGISTRY.setdefault((each, role), {}) for each in ((space,) if space else SPACES)]
+    catalogues = [_REGISTRY.setdefault((key, role), {}) for key in ((space,) if space else SPACES)]
     for entries in catalogues:
         other = _last_whole(entries.get(type, ()))
         is_own = other is not None and _belongs_to_package(other)

@@ -275,12 +275,12 @@ class PitchPoint(NamedTuple):
 
     def across_teeth(self, helix_angle: Any) -> Jet:
         """Return a vector in the common tangent plane, perpendicular to the teeth."""
-        around = unit(self.arms[0])
-        along = cross(self.normal, around)
+        radial = unit(self.arms[0])
+        along = cross(self.normal, radial)
         along = along * jnp.where(along.dot(self.axes[0]).coefficients[0] < 0, -1.0, 1.0)
         angle = 0.0 if helix_angle is None else helix_angle
-        rolling = around * jnp.cos(angle) - along * jnp.sin(angle)
-        return where(self.rolls, rolling, unit(cross(self.normal, where(self.rolls, around, self.sliding))))
+        rolling = radial * jnp.cos(angle) - along * jnp.sin(angle)
+        return where(self.rolls, rolling, unit(cross(self.normal, where(self.rolls, radial, self.sliding))))
 
 
 def _frame_of(axis: Vectors, normal: Vectors) -> tuple[Any, Any]:

@@ -159,8 +159,8 @@ class Cylindrical(AbstractConstraint, type="cylindrical", space="spatial"):
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
         """Return the slip of the shaft in its bore along the axis and around it, m/s."""
-        around = _turning(bodies, moving, self.axis_i) * self.friction.radius
-        return rows(_sliding(bodies, moving, self), around)
+        rotation = _turning(bodies, moving, self.axis_i) * self.friction.radius
+        return rows(_sliding(bodies, moving, self), rotation)
 
 
 class Prismatic(AbstractConstraint, type="prismatic", space="spatial"):
@@ -313,8 +313,8 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
         """Return the slip of the nut along the thread at its mean radius, m/s."""
         cosine, sine = self._helix()
-        around = _turning(bodies, moving, self.axis_i) * self.friction.radius
-        return rows(around * cosine + _sliding(bodies, moving, self) * sine)
+        rotation = _turning(bodies, moving, self.axis_i) * self.friction.radius
+        return rows(rotation * cosine + _sliding(bodies, moving, self) * sine)
 
     def pressing(self, bodies: tuple[Any, ...], force: Jet) -> Jet:
         """Return the normal force on the flanks of the thread, N, from its component along the axis."""

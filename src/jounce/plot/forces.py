@@ -71,10 +71,10 @@ def draw_reactions(motion: Motion, names: Sequence[str] | None = None) -> Figure
     if motion.order < 2:
         message = "forces need accelerations; solve to order 2 or more"
         raise MechanismError(message, name="order", value=motion.order)
-    known = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
+    valid_names = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
     for name in names or ():
-        check_name("joint, driver or force", name, known, MechanismError, name="output")
-    selected = names or known
+        check_name("joint, driver or force", name, valid_names, MechanismError, name="output")
+    selected = names or valid_names
     reactions: dict[str, Any] = {}
     for name in mechanism.joints:
         if name in selected:

@@ -281,12 +281,12 @@ def _extremes(
         fractions = np.linspace(0.0, 1.0, POINTS)[:, None, None]
         best, neighbors = (low.copy(), np.full(low.shape, -np.inf)), []
         for _ in range(ROUNDS):
-            around = low + fractions * (high - low)
-            values = _own(motion, around)
-            _keep_best(*best, 0.0, around, values)
+            instants = low + fractions * (high - low)
+            values = _own(motion, instants)
+            _keep_best(*best, 0.0, instants, values)
             top = np.clip(np.argmax(values, axis=0), 1, POINTS - 2)
             neighbors = [np.take_along_axis(values, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 0, 1)]
-            low, high = (np.take_along_axis(around, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 1))
+            low, high = (np.take_along_axis(instants, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 1))
         vertex = _vertex(low, high, *neighbors)[None]
         _keep_best(*best, 0.0, vertex, _own(motion, vertex))
         equal = best[1] >= best[1].max(axis=0) - rounding
@@ -381,11 +381,11 @@ def _keep_best(
     times: Float[np.ndarray, "*curves"],
     sizes: Float[np.ndarray, "*curves"],
     rounding: Float[np.ndarray, " curves"] | float,
-    around: Float[np.ndarray, "points *curves"],
+    instants: Float[np.ndarray, "points *curves"],
     values: Float[np.ndarray, "points *curves"],
 ) -> None:
     """Replace maxima by values that are larger by more than rounding, so that requested instants are preferred."""
-    time, size = (np.take_along_axis(x, np.argmax(values, axis=0)[None], axis=0)[0] for x in (around, values))
+    time, size = (np.take_along_axis(x, np.argmax(values, axis=0)[None], axis=0)[0] for x in (instants, values))
     with np.errstate(invalid="ignore"):
         is_better = size > sizes + rounding
     times[is_better], sizes[is_better] = time[is_better], size[is_better]

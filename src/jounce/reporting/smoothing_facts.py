@@ -14,7 +14,7 @@ SHOWN = 3  # largest number of dwells in the table
 
 def noisy_joints(motion: SmoothedTrajectory) -> list[str]:
     """Return the joints whose noise is so large, relative to the deviation, that the motion follows it."""
-    return [name for name, own in motion.joints.items() if motion.deviation < FOLLOWED * own.noise]
+    return [name for name, joint in motion.joints.items() if motion.deviation < FOLLOWED * joint.noise]
 
 
 def smoothing_table(motion: SmoothedTrajectory) -> Table:
@@ -22,12 +22,12 @@ def smoothing_table(motion: SmoothedTrajectory) -> Table:
     rows = [
         [
             name,
-            f"{own.noise:.3g}",
-            f"{own.away:.3g}",
-            f"{own.cutoff[0]:.3g} to {own.cutoff[1]:.3g}",
-            _dwells(own.dwells),
+            f"{joint.noise:.3g}",
+            f"{joint.away:.3g}",
+            f"{joint.cutoff[0]:.3g} to {joint.cutoff[1]:.3g}",
+            _dwells(joint.dwells),
         ]
-        for name, own in motion.joints.items()
+        for name, joint in motion.joints.items()
     ]
     heading = ("joint", "noise", "farthest", "followed below, Hz", "stands still, s")
     return Table("", heading, rows, numbers=(1, 2))
@@ -53,12 +53,12 @@ def smoothing_result(
         "joints": [
             {
                 "joint": name,
-                "noise": own.noise,
-                "farthest": own.away,
-                "followed": list(own.cutoff),
-                "dwells": [list(span) for span in own.dwells],
+                "noise": joint.noise,
+                "farthest": joint.away,
+                "followed": list(joint.cutoff),
+                "dwells": [list(span) for span in joint.dwells],
             }
-            for name, own in motion.joints.items()
+            for name, joint in motion.joints.items()
         ],
         "follows_noise": noisy_joints(motion),
         "written": written[0],

@@ -219,6 +219,6 @@ def unexpected(error: Exception) -> str:
     import traceback
 
     message = shortened(str(error).strip().partition("\n")[0])
-    words = f"unexpected {type(error).__name__}: {message}".rstrip(": ")
+    text = f"unexpected {type(error).__name__}: {message}".rstrip(": ")
     frames = [f for f in traceback.extract_tb(error.__traceback__) if "site-packages" not in f.filename]
-    return f"{words} ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else words
+    return f"{text} ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else text

@@ -74,7 +74,7 @@ def files(subject: Subject) -> None:
         write_mechanism(mechanism, path)
         read = getattr(load(path), f"{role}s")["own"]
     motion = random_motion(subject.random(), space, 2)
-    first, second = (residual(group_of([each], space), motion) for each in (element, read))
+    first, second = (residual(group_of([variant], space), motion) for variant in (element, read))
     if type(read) is not kind or not np.array_equal(first, second):
         raise Broken("a joint that was written to a file and read is not the same")
 

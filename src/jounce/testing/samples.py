@@ -156,16 +156,16 @@ def unit_quaternion_and_rate(series: Sequence[Sequence[Any]]) -> tuple[Jet, Jet 
     q = [Jet([jnp.asarray(level[k]) for level in series]) for k in range(4)]
     length = sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
     p = [x / length for x in q]
-    whole = stack(p)
-    if whole.order == 0:
-        return whole, None
+    quaternion = stack(p)
+    if quaternion.order == 0:
+        return quaternion, None
     a, b = p, [x.differentiate() for x in p]
     rate = [
         2.0 * (a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2]),
         2.0 * (a[0] * b[2] - a[2] * b[0] - a[3] * b[1] + a[1] * b[3]),
         2.0 * (a[0] * b[3] - a[3] * b[0] - a[1] * b[2] + a[2] * b[1]),
     ]
-    return whole.dense(), stack(rate).dense()
+    return quaternion.dense(), stack(rate).dense()
 
 
 def coordinates_of(space: str) -> int:
@@ -176,8 +176,8 @@ def coordinates_of(space: str) -> int:
 def directions(space: str) -> np.ndarray:
     """Return a batch of unit steps, one for each coordinate of each moving body: shape (coordinates, bodies, batch)."""
     c, moving = coordinates_of(space), len(BODIES) - 1
-    each = np.eye(c * moving).reshape(moving, c, moving * c)
-    return np.concatenate([np.zeros((c, 1, moving * c)), np.swapaxes(each, 0, 1)], axis=1)
+    unit_steps = np.eye(c * moving).reshape(moving, c, moving * c)
+    return np.concatenate([np.zeros((c, 1, moving * c)), np.swapaxes(unit_steps, 0, 1)], axis=1)
 
 
 def lanes_of(space: str) -> int:

@@ -189,7 +189,7 @@ _GEOMETRIC = frozenset(("length", "angle", "time", "length per angle"))
 
 def inferred(
     expression: Expression,
-    known: Mapping[str, Dimension],
+    dimensions: Mapping[str, Dimension],
     variables: Mapping[str, Dimension | None] | None = None,
     kind: str = "any",
 ) -> Dimension | None:
@@ -203,7 +203,7 @@ def inferred(
     ----------
     expression : Expression
         Expression of named values.
-    known : mapping of str to Dimension
+    dimensions : mapping of str to Dimension
         Dimensions of the parameters with units.
     variables : mapping of str to Dimension or None, optional
         Dimensions of time and other variables of a law; None if unknown.
@@ -225,7 +225,7 @@ def inferred(
     ...
     jounce.errors.UnitError: 'r + T' adds a time to a length
     """
-    part = _Reader(expression, known, variables or {}).read()
+    part = _Reader(expression, dimensions, variables or {}).read()
     certain = part.stated and part.doubt <= (LIKELY if kind in _GEOMETRIC else 0)
     return part.dimension or None if certain else None  # a ratio may be meant as a share of 1 m
 
@@ -234,9 +234,9 @@ class _Reader:
     """Derives the dimension of an expression from those of its names."""
 
     def __init__(
-        self, expression: Expression, known: Mapping[str, Dimension], variables: Mapping[str, Dimension | None]
+        self, expression: Expression, dimensions: Mapping[str, Dimension], variables: Mapping[str, Dimension | None]
     ):
-        self.text, self.expression, self.known, self.variables = expression.text, expression, known, variables
+        self.text, self.expression, self.known, self.variables = expression.text, expression, dimensions, variables
         self.varies = bool(expression.names & variables.keys())
 
     def read(self) -> _Part:
@@ -247,8 +247,8 @@ class _Reader:
             return _UNKNOWN
         if value == CONSTANTS["deg"]:
             return _Part(ANGLE, number=value)
-        small = not self.varies and (value == 0.5 or (value.is_integer() and value <= 12))
-        return _Part(NUMBER, 0 if value == CONSTANTS["pi"] else LIKELY if small else DOUBTFUL, number=value)
+        is_small = not self.varies and (value == 0.5 or (value.is_integer() and value <= 12))
+        return _Part(NUMBER, 0 if value == CONSTANTS["pi"] else LIKELY if is_small else DOUBTFUL, number=value)
 
     def _name(self, name: str) -> _Part:
         if name in self.known:

@@ -130,14 +130,14 @@ def _check_target(kind: str, out: Path, overwrite: bool) -> None:
 
 def _check_names(mechanism: Mechanism, kind: str, names: Sequence[str], file: Path) -> None:
     """Raise MechanismError if a name does not exist, before anything is solved."""
-    known = [*mechanism.outputs]
+    valid = [*mechanism.outputs]
     if kind == "reactions":
-        known = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
-    elif not known and kind in ("outputs", *PORTRAITS):
+        valid = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
+    elif not valid and kind in ("outputs", *PORTRAITS):
         raise MechanismError("there is nothing to draw; name some outputs", path=file, name="outputs")
     noun = "joint, driver or force" if kind == "reactions" else "output"
     for name in names:
-        check_name(noun, name, known, MechanismError, path=file, name="joints" if kind == "reactions" else "outputs")
+        check_name(noun, name, valid, MechanismError, path=file, name="joints" if kind == "reactions" else "outputs")
     if kind in PORTRAITS and len(names) > 1:
         raise MechanismError("one output is drawn at a time", path=file, name="--output", value=list(names))
 

@@ -82,8 +82,8 @@ class Source:
         for key in entry:
             if keys is not None and key not in keys:
                 replacement = (others or {}).get(key)
-                words = unknown("key", key, keys) if replacement is None else f"the key for that is '{replacement}'"
-                raise self.error(words, (*location, key))
+                phrase = unknown("key", key, keys) if replacement is None else f"the key for that is '{replacement}'"
+                raise self.error(phrase, (*location, key))
         return entry
 
     def value(

@@ -80,8 +80,8 @@ def numbers_of(path: str, error_type: type[JounceError]) -> Numbers | None:
         if len(content) <= MAX_SAMPLES:
             return None
         row = _ROW.search(str(reason))
-        words = str(reason).split(";")[0].encode("ascii", "backslashreplace").decode("ascii")
-        message = f"a file of this length may contain numbers only: {words}"
+        reason_text = str(reason).split(";")[0].encode("ascii", "backslashreplace").decode("ascii")
+        message = f"a file of this length may contain numbers only: {reason_text}"
         raise error_type(message, path=path, line=None if row is None else 2 + int(row[1])) from None
     return Numbers(1, names, values, offsets) if values.shape[1] == len(names) else None
 

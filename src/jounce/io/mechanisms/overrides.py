@@ -74,7 +74,7 @@ def override(mechanism: Mechanism, texts: Iterable[str]) -> Mechanism:
         name = (error.name or "").removeprefix("parameters.")
         raise type(error)(error.message, name=f"--set {name}", value=error.value) from None
     result.parameter_values  # noqa: B018 - evaluated to report circular expressions now
-    plain = [name for name, text in values.items() if is_plain(text)]
-    if plain:
-        warn_of_values(mechanism, result, plain, "--set")
+    unitless = [name for name, text in values.items() if is_plain(text)]
+    if unitless:
+        warn_of_values(mechanism, result, unitless, "--set")
     return result

@@ -57,7 +57,7 @@ def write_revised(
     """
     suffix = Path(fspath(path)).suffix.lower()
     check_target(path, DATA_FILES, "mechanism file", overwrite=overwrite)
-    kinds = [".yaml" if each == ".yml" else each for each in (suffix, Path(fspath(original)).suffix.lower())]
+    kinds = [".yaml" if ending == ".yml" else ending for ending in (suffix, Path(fspath(original)).suffix.lower())]
     if kinds[0] != kinds[1]:
         message = f"must be of the format of {fspath(original)}; jounce convert makes another of it"
         raise OutputError(message, path=fspath(path), value=suffix)

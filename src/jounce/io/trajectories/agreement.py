@@ -155,10 +155,10 @@ def _outliers(times: np.ndarray, values: np.ndarray, rate: np.ndarray) -> tuple[
         change = np.abs(turn) + np.abs(rate[count + 3 :] - rate[:groups]) + np.ptp(windows, axis=0)
         excesses = np.full(groups, np.inf)
         for k in range(2, count + 2):
-            own = slice(k, k + groups)
-            share = (times[own] - times[left]) / (times[right] - times[left])
+            window = slice(k, k + groups)
+            fraction = (times[window] - times[left]) / (times[right] - times[left])
             noisy = by_noise[k - 1 : k - 1 + groups]
-            by_neighbors = np.abs(rate[own] - rate[left] - share * turn) - noisy
+            by_neighbors = np.abs(rate[window] - rate[left] - fraction * turn) - noisy
             excesses = np.minimum(excesses, np.minimum(deviation[k - 1 : k - 1 + groups], by_neighbors))
         excesses -= change
         worst = int(np.argmax(excesses))

@@ -201,12 +201,12 @@ def _inner(equation: JaxprEqn) -> Iterator[Jaxpr]:
 def _narrowed(jaxpr: Jaxpr) -> np.dtype | None:
     """Return the type narrower than double precision to which a program converts numbers, or None."""
     for equation in jaxpr.eqns:
-        made: Any = equation.params.get("new_dtype")
+        new_dtype: Any = equation.params.get("new_dtype")
         input_avals: list[Any] = [v.aval for v in equation.invars]
         if equation.primitive.name == "convert_element_type" and input_avals[0].dtype == np.float64:
-            made = np.dtype(made)
-            if jnp.issubdtype(made, jnp.floating) and made != np.float64:
-                return made
+            new_dtype = np.dtype(new_dtype)
+            if jnp.issubdtype(new_dtype, jnp.floating) and new_dtype != np.float64:
+                return new_dtype
         for inner in _inner(equation):
             if dtype := _narrowed(inner):
                 return dtype

@@ -156,9 +156,9 @@ def over_instances(
         )
         return jax.vmap(function, in_axes=(axes, -1), out_axes=-1)(given, x)
 
-    each = tuple(-2 if is_many else None for is_many in stacked)
+    captured_axes = tuple(-2 if is_many else None for is_many in stacked)
     broadcast = x.map(lambda c: jnp.broadcast_to(c, jnp.broadcast_shapes(x.shape, *_ends(captured, stacked))))
-    return jax.vmap(of_instance, in_axes=(each, -2), out_axes=-2)(tuple(captured), broadcast)
+    return jax.vmap(of_instance, in_axes=(captured_axes, -2), out_axes=-2)(tuple(captured), broadcast)
 
 
 def _ends(captured: Sequence[Any], stacked: Sequence[bool]) -> list[tuple[int, ...]]:

@@ -199,12 +199,12 @@ def _as_program(on_values: Callable[..., Any], traced: ClosedJaxpr, jets: Sequen
 @lru_cache(maxsize=1000)
 def _on_series(program: Program, tree: Any, shapes: tuple[tuple[int, ...], ...]) -> ClosedJaxpr:
     """Return the program that JAX traces when a program on values is run on jets of given shapes."""
-    reading, held = ReadMethod(program, ()), [v.aval for v in program.closed.jaxpr.invars[: len(program.shapes)]]
+    reading, avals = ReadMethod(program, ()), [v.aval for v in program.closed.jaxpr.invars[: len(program.shapes)]]
 
     def again(captured: Any, *x: Any) -> Any:
         return jax.tree.leaves(reading.once(captured, jax.tree.unflatten(tree, x)))
 
-    example = [jax.ShapeDtypeStruct(aval.shape, aval.dtype) for aval in held]
+    example = [jax.ShapeDtypeStruct(aval.shape, aval.dtype) for aval in avals]
     return jax.make_jaxpr(again)(example, *(jax.ShapeDtypeStruct(shape, float) for shape in shapes))
 
 

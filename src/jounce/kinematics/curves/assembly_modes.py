@@ -281,10 +281,10 @@ class _Search:
         batch = {name: x[..., None] for name, x in coordinates.items()}
         if not np.array_equal(axis_signs(self.system, batch), self.axis_signs):
             return False
-        for known in self.configurations:
-            tolerance = SAME if known.smallest > NEARLY_SINGULAR else SAME_IF_SINGULAR
-            if np.max(np.abs(self.tracker.difference(coordinates, known.coordinates))) < tolerance:
-                known.hits += hits
+        for configuration in self.configurations:
+            tolerance = SAME if configuration.smallest > NEARLY_SINGULAR else SAME_IF_SINGULAR
+            if np.max(np.abs(self.tracker.difference(coordinates, configuration.coordinates))) < tolerance:
+                configuration.hits += hits
                 return False
         coordinates = self._polished(coordinates)
         point = self.tracker.point_without_series({name: x[..., None] for name, x in coordinates.items()}, self.instant)
@@ -323,9 +323,9 @@ class _Search:
         for arc_length in curve.where(curve.first_value):
             coordinates = curve.coordinates_at(arc_length)
             self.add(coordinates, hits=0)
-            known = self._nearest(coordinates)
-            if known.circuit is None:
-                known.circuit, known.branch = circuit, before + curve.branch_at(arc_length)
+            configuration = self._nearest(coordinates)
+            if configuration.circuit is None:
+                configuration.circuit, configuration.branch = circuit, before + curve.branch_at(arc_length)
 
     def _nearest(self, coordinates: dict[str, np.ndarray]) -> _Configuration:
         distances = [np.max(np.abs(self.tracker.difference(coordinates, x.coordinates))) for x in self.configurations]

@@ -88,17 +88,17 @@ def crossing(tracker: PathTracker, before: CurvePoint, ahead: complex) -> tuple[
         return None
     step = point.arc_length - before.arc_length
     points = tracker.points(shortened, np.array([2 * step]))
-    beyond = tracker.point_at_lane(points, 0, before.arc_length + 2 * step, before.rows)
-    coordinates = {name: c[0] for name, c in beyond.coordinates.items()}
+    far_point = tracker.point_at_lane(points, 0, before.arc_length + 2 * step, before.rows)
+    coordinates = {name: c[0] for name, c in far_point.coordinates.items()}
     departure = tracker.difference(coordinates, shortened.at(2 * step))
     if not all_finite(points)[0] or np.max(np.abs(departure)) > LARGEST_DEPARTURE:
         return None
     null = tracker.null_space(point.jacobian, NEARLY_SINGULAR)
     tangent = tracker.tangent(point)
-    if null.shape[1] < 2 or float(tangent @ tracker.tangent(beyond)) < 0:
+    if null.shape[1] < 2 or float(tangent @ tracker.tangent(far_point)) < 0:
         return None
     tangents, decided = _tangents(tracker, point, null, tangent)
-    return ChangePoint(point, tangents, null.shape[1], decided), beyond
+    return ChangePoint(point, tangents, null.shape[1], decided), far_point
 
 
 def departed(tracker: PathTracker, change_point: ChangePoint, branch: int) -> CurvePoint:

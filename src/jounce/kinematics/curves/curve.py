@@ -236,7 +236,7 @@ class Curve(Displayed):
             for number, point in enumerate(curve.change_points):
                 for branch in range(1, len(point.tangents)):
                     other = curve.follow(number, branch)
-                    if not any(known.passes(other.coordinates_at(0.0)) for known in curves):
+                    if not any(member.passes(other.coordinates_at(0.0)) for member in curves):
                         curves.append(other)
                         pending.append(other)
         return tuple(curves)

@@ -113,12 +113,12 @@ def _named(mechanism: Any, name: str, location: str) -> tuple[Any, int | None]:
         return mechanism.outputs[name], None
     stem, _, label = name.rpartition("_")
     labels = PointOutput.labels[: POSITION_COMPONENTS[mechanism.space]]
-    points = {known for known, output in mechanism.outputs.items() if isinstance(output, PointOutput)}
+    points = {name for name, output in mechanism.outputs.items() if isinstance(output, PointOutput)}
     if stem in points and label in labels:
         return mechanism.outputs[stem], labels.index(label)
-    known = [
+    valid_names = [
         column
         for output in mechanism.outputs
         for column in ([f"{output}_{label}" for label in labels] if output in points else [output])
     ]
-    raise MechanismError(no_such("output", name, known), name=location, value=name)
+    raise MechanismError(no_such("output", name, valid_names), name=location, value=name)

@@ -63,8 +63,8 @@ def draw_bands(spread: xarray.Dataset, columns: Sequence[Column], title: str = "
         grid = figure.subplots(len(columns), 3, sharex=True, squeeze=False)
         for row, column in zip(grid, columns, strict=True):
             _draw_row(spread, column, row, parameters)
-        for axes, words in zip(grid[0], ("value", "deviation, 95 % of designs", "part of the variance"), strict=True):
-            axes.set_title(words, loc="left")
+        for axes, heading in zip(grid[0], ("value", "deviation, 95 % of designs", "part of the variance"), strict=True):
+            axes.set_title(heading, loc="left")
         for axes in grid[-1]:
             axes.set_xlabel("time  $t$  (s)")
         legend_entries = [axes.get_legend_handles_labels() for axes in grid[0][1:]]

@@ -47,9 +47,9 @@ def draw_smoothing(given: JointTrajectory, motion: SmoothedTrajectory, title: st
         for k, name in enumerate(names):
             rounds, index = divmod(k, len(LINE_COLORS))
             line: dict[str, Any] = {"color": LINE_COLORS[index], "linestyle": DASHES[rounds % len(DASHES)]}
-            at, values = _samples(given, name)
-            positions = motion.derivatives(at, 0)[:, 0, motion.names.index(name)]
-            distance_axes.plot(at, (values - positions) / motion.deviation, ".", markersize=1.2, color=line["color"])
+            t, values = _samples(given, name)
+            positions = motion.derivatives(t, 0)[:, 0, motion.names.index(name)]
+            distance_axes.plot(t, (values - positions) / motion.deviation, ".", markersize=1.2, color=line["color"])
             label = shown_name(name) if k < NAMED else None
             jerk.plot(times, jerks[:, motion.names.index(name)], label=label, linewidth=0.9, **line)
         for side in (-1, 1):

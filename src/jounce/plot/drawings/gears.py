@@ -158,8 +158,8 @@ def shaft_wheels(mechanism: Mechanism, gear: Any) -> tuple[list[Center], list[fl
         thicknesses = np.maximum(np.array([ratio, 1.0]) / (1.0 + ratio), THINNEST)
         radii = (thicknesses / thicknesses.sum() * distance).tolist()
     else:
-        known = [abs(distances[0]) * sine, abs(distances[1]) * sine / ratio]
-        second = next((x for x in known if x > 1e-9 * size), 0.15 * size)
+        lengths = [abs(distances[0]) * sine, abs(distances[1]) * sine / ratio]
+        second = next((x for x in lengths if x > 1e-9 * size), 0.15 * size)
         radii = [ratio * second, second]
         for k, other in enumerate((second, ratio * second)):
             side = axes[k] if distances[k] >= 0 else -axes[k]
@@ -172,9 +172,9 @@ def _on_axis(mechanism: Mechanism, body: str, axis: Center) -> Center:
     """Return a point of a body on one of its axes: that of a joint with this axis, or the origin."""
     for joint in mechanism.joints.values():
         for pair in facts_of(type(joint)).held_parallel:
-            for of, name, end in zip(joint.bodies, pair, "ij", strict=False):
+            for owner, name, end in zip(joint.bodies, pair, "ij", strict=False):
                 point = getattr(joint, f"point_{end}", None)
-                if of != body or point is None:
+                if owner != body or point is None:
                     continue
                 direction = np.asarray(resolve(getattr(joint, name), mechanism.parameter_values), float)
                 if np.linalg.norm(np.cross(direction, axis)) <= 1e-9 * np.linalg.norm(direction) * np.linalg.norm(axis):

@@ -113,27 +113,27 @@ def _pin_in_slot(drawing: Drawing, symbol: Symbol) -> None:
 
 def _curve(drawing: Drawing, symbol: Symbol) -> None:
     """Draw the curve of a body as a groove, or the lines of a surface, with the point held on it."""
-    body, held = symbol.bodies[0], drawing.global_point(symbol, 1)
+    body, guided = symbol.bodies[0], drawing.global_point(symbol, 1)
     color = "#888888" if body == GROUND else drawing.colors.get(body, INK)
-    for line in shown(symbol.curve, drawing.within(body, held), 4 * drawing.unit):
+    for line in shown(symbol.curve, drawing.within(body, guided), 4 * drawing.unit):
         flat = drawing.flat(drawing.at(body, line))
         if symbol.kind == "curve":
             drawing.curve(flat, stroke=color, width=5.0, layer=GUIDES)
             drawing.curve(flat, stroke=parts.PAPER, width=3.2, layer=GUIDES)
         else:
             drawing.curve(flat, stroke=tinted(color, 0.6), width=0.6, layer=GUIDES - 1)
-    (parts.pin if drawing.planar else parts.ball)(drawing, drawing.flat(held))
+    (parts.pin if drawing.planar else parts.ball)(drawing, drawing.flat(guided))
 
 
 def _cam(drawing: Drawing, symbol: Symbol) -> None:
     """Draw the pitch curve of a plate cam, which a point of its follower traces, and the point as a roller."""
     disc, _ = symbol.bodies
-    held, color = drawing.global_point(symbol, 1), drawing.colors.get(disc, INK)
-    pitch, whole = pitch_curve(drawing.within(disc, held))
+    guided, color = drawing.global_point(symbol, 1), drawing.colors.get(disc, INK)
+    pitch, whole = pitch_curve(drawing.within(disc, guided))
     if len(pitch) > 1:
         flat = drawing.flat(drawing.at(disc, pitch))
         drawing.curve(flat, closed=whole, stroke=color, width=1.6, layer=WHEELS, owner=f"bodies.{disc}")
-    drawing.disc(drawing.flat(held), 0.9 * drawing.unit, stroke=INK, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
+    drawing.disc(drawing.flat(guided), 0.9 * drawing.unit, stroke=INK, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
 
 
 def _coordinate(drawing: Drawing, symbol: Symbol) -> None:

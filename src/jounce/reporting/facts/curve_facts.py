@@ -126,7 +126,7 @@ def curve_summary(facts: Facts, file: str) -> str:
         f"{shape} curve of configurations, arc length {facts['stop'] - facts['start']:.9g}",
     ]
     if not facts["closed"]:
-        lines += [f"{which}: {reason}" for which, reason in zip(("start", "end"), facts["ends"], strict=True)]
+        lines += [f"{end_name}: {reason}" for end_name, reason in zip(("start", "end"), facts["ends"], strict=True)]
     if facts["driver"] is None:
         lines.append("nothing is driven: no limit positions")
     elif facts["branches"][0]["low"] is None:

@@ -136,9 +136,9 @@ def _mechanism_start(facts: Facts) -> list[str]:
         lines += [f"  {time['remark']}"] if "remark" in time else []
     else:
         lines.append("  no time grid is given")
-    words = (*law_words(facts["laws"]), *_train_words(facts["trains"]), *efficiency_words(facts["efficiencies"]))
-    words = (*words, *screw_words(facts["screws"]), *line_words(facts["lines"]), *facts["remarks"])
-    lines += [f"  {line}" for line in words]
+    remarks = (*law_words(facts["laws"]), *_train_words(facts["trains"]), *efficiency_words(facts["efficiencies"]))
+    remarks = (*remarks, *screw_words(facts["screws"]), *line_words(facts["lines"]), *facts["remarks"])
+    lines += [f"  {line}" for line in remarks]
     if freedom["message"] and facts["ok"] and freedom["left"]:
         lines.append("  it has degrees of freedom left: jounce simulate moves it by its forces")
     elif freedom["message"]:

@@ -41,12 +41,12 @@ class DisplayOptions:
         points = {point.name: point for point in recording.appearance.points}
         traced = tuple(
             dataclasses.replace(
-                each,
-                point=points.get(each.point.name, each.point),
-                orders=tuple(order for order in each.orders if order <= recording.order),
+                trace,
+                point=points.get(trace.point.name, trace.point),
+                orders=tuple(order for order in trace.orders if order <= recording.order),
             )
-            for each in self.traced
-            if each.point.body in recording.bodies
+            for trace in self.traced
+            if trace.point.body in recording.bodies
         )
         return dataclasses.replace(self, traced=traced, path_order=min(self.path_order, recording.order))
 
@@ -99,8 +99,8 @@ class Overlay:
         """
         options = options.fitted(recording)
         arrows, scales = {}, {}
-        for order in sorted({order for each in options.traced for order in each.orders}):
-            motions = [recording.motion(each.point) for each in options.traced if order in each.orders]
+        for order in sorted({order for trace in options.traced for order in trace.orders}):
+            motions = [recording.motion(trace.point) for trace in options.traced if order in trace.orders]
             automatic = length_scale(recording, [motion[:, order] for motion in motions]) or 1.0
             scales[order] = automatic * options.lengths.get(order, 1.0)
             pairs = [(motion[:, 0], motion[:, order]) for motion in motions]

@@ -80,7 +80,7 @@ class ArrowsTab(Observer):
         self._exchange((*self._others(point), TracedPoint(point, orders, path)))
 
     def _others(self, point: BodyPoint) -> tuple[TracedPoint, ...]:
-        return tuple(each for each in self.page.options.traced if each.point.name != point.name)
+        return tuple(trace for trace in self.page.options.traced if trace.point.name != point.name)
 
     def _exchange(self, traced: tuple[TracedPoint, ...]) -> None:
         self._set(traced=traced)
@@ -91,7 +91,7 @@ class ArrowsTab(Observer):
         for folder in self._folders:
             folder.remove()
         with self.list:
-            self._folders = [self._add_boxes(each) for each in traced]
+            self._folders = [self._add_boxes(trace) for trace in traced]
 
     def _add_boxes(self, traced: TracedPoint) -> Any:
         point, folder = traced.point, self.gui.add_folder(traced.point.name)
@@ -106,14 +106,16 @@ class ArrowsTab(Observer):
         return folder
 
     def _switch(self, point: BodyPoint, order: int, on: bool) -> None:
-        for each in self.page.options.traced:
-            if each.point.name == point.name:
-                orders = {*each.orders, order} if on else {*each.orders} - {order}
+        for trace in self.page.options.traced:
+            if trace.point.name == point.name:
+                orders = {*trace.orders, order} if on else {*trace.orders} - {order}
                 self._replace(point, orders=tuple(sorted(orders)))
 
     def _replace(self, point: BodyPoint, **parts: Any) -> None:
         traced = self.page.options.traced
-        self._set(traced=tuple(replace(each, **parts) if each.point.name == point.name else each for each in traced))
+        self._set(
+            traced=tuple(replace(trace, **parts) if trace.point.name == point.name else trace for trace in traced)
+        )
 
     def on_recording(self, recording: Recording) -> None:
         """Update the list of points for a new motion."""

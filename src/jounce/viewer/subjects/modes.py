@@ -51,7 +51,7 @@ class ModesSubject:
         names = {parameter.name for parameter in parameters}
         self._keys = _unused(names, MODE), _unused(names, AMPLITUDE)
         chosen = Parameter(self._keys[0], 1.0, 1.0, max(float(count), 1.0 + 1e-9), GROUP, whole=True)
-        grouped = (dataclasses.replace(each, group="Parameters") for each in parameters)
+        grouped = (dataclasses.replace(item, group="Parameters") for item in parameters)
         self.parameters = (chosen, Parameter(self._keys[1], 0.1, 0.01, LARGEST, GROUP), *grouped)
 
     def solve(self, values: Mapping[str, float], _order: int) -> Recording:

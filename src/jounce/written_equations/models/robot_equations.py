@@ -183,8 +183,8 @@ def _parameters(robot: Robot, *, drives: bool) -> tuple[list[dict[str, Any]], di
             unit(inertia=(k, turn @ _unit(i, j) @ turn.T))
         center, mass = turn.T @ tree.center[k], float(tree.mass[k])
         moments = turn.T @ tree.inertia[k] @ turn + mass * _about_origin(center)
-        own = [mass, *(mass * center), *moments[np.triu_indices(3)]]
-        values |= {f"{link}.{name}": float(x) for name, x in zip(INERTIAL, own, strict=True)}
+        row = [mass, *(mass * center), *moments[np.triu_indices(3)]]
+        values |= {f"{link}.{name}": float(x) for name, x in zip(INERTIAL, row, strict=True)}
     for field in OF_DRIVES if drives else ():
         given = np.asarray(getattr(tree, field))
         for k, joint in enumerate(robot.joint_names if field != "friction_skew" or given.any() else ()):

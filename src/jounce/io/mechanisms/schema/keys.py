@@ -108,5 +108,5 @@ def location_of(keys: Iterable[FileKey], field: str) -> Location:
         if field in key.fields:
             index = key.fields.index(field)
             return (key.key,) if len(key.fields) == 1 else (key.key, key.names[index] if key.names else index)
-    first, _, rest = field.partition(".")
-    return (first, rest) if rest else (field,)
+    first, _, remainder = field.partition(".")
+    return (first, remainder) if remainder else (field,)

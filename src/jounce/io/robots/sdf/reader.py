@@ -354,7 +354,7 @@ class _Reader:
         reference = self.frames.link(text_of(gear.element, "gearbox_reference_body", *location), body, *location)
         needed(gear.element, "gearbox_ratio", *location)
         ratio = number_of(gear.element, "gearbox_ratio", *location, default=1.0)
-        turned = []
+        hinge_signs = []
         for link, axis in zip((gear.parent, gear.child), gear.axes, strict=True):
             joint = next((j for j in tree if {j.parent, j.child} == {reference, link}), None)
             if joint is None or joint.kind not in ("revolute", "continuous"):
@@ -364,6 +364,6 @@ class _Reader:
             if abs(abs(sign) - 1) > AXIS_TOLERANCE:
                 message = f"the axis of a gearbox must be that of {joint.name}"
                 raise gear.element.error(message, *location, value=axis.direction.tolist())
-            turned.append((joint.name, math.copysign(1.0, sign)))
-        (first, sign_1), (second, sign_2) = turned
+            hinge_signs.append((joint.name, math.copysign(1.0, sign)))
+        (first, sign_1), (second, sign_2) = hinge_signs
         return second, Mimic(first, -ratio * sign_1 * sign_2)

@@ -87,14 +87,14 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     if not links:
         raise root.error("a robot needs at least one <link>")
     lines = NamedElements(root)
-    made, pulled, springs = [], shares_of_gravity(root), joint_springs(root)
+    robot_links, pulled, springs = [], shares_of_gravity(root), joint_springs(root)
     if WORLD not in links and any(_parent(element) == WORLD for element in joints.values()):
-        made.append(Link(WORLD))
+        robot_links.append(Link(WORLD))
     for name, element in links.items():
         lines.add(element, "links", name)
-        made.append(_link(name, element, faults, pulled.get(name, 1.0)))
+        robot_links.append(_link(name, element, faults, pulled.get(name, 1.0)))
     for name, element in joints.items():
-        _check_joint(element, name, dict.fromkeys([link.name for link in made]))
+        _check_joint(element, name, dict.fromkeys([link.name for link in robot_links]))
         _add_joint(lines, element, name)
     parts: list[Joint] = []
     mimics, armatures = _mimics(joints, faults), rotors(root, faults)
@@ -105,17 +105,17 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
             if len(expanded) == 1 and expanded[0].moving and name in springs:
                 expanded = [dataclasses.replace(expanded[0], **springs[name])]
             named[name] = expanded
-            made += more
+            robot_links += more
             parts += expanded
             for part in expanded:
                 lines.add(element, "joints", part.name)
-        ordered(_distinct("links", made, root), _distinct("joints", parts, root))
+        ordered(_distinct("links", robot_links, root), _distinct("joints", parts, root))
         parts = with_room(parts, faults, lines.located)
         closures = []
-        for loop in urdf_closures(root, [link.name for link in made]):
+        for loop in urdf_closures(root, [link.name for link in robot_links]):
             closures.append(_closure(loop, {part.name for part in parts}, faults))
             lines.add(loop.element, "closures", closures[-1].name)
-        robot = Robot(root.attributes.get("name", "robot"), made, parts, closures=closures, strict=False)
+        robot = Robot(root.attributes.get("name", "robot"), robot_links, parts, closures=closures, strict=False)
         _check_masses(robot, joints, links, faults, massless)
         note_left_out(root, robot, named, faults)
         return robot

@@ -55,9 +55,9 @@ def recorded_states(path: str, states: Sequence[State]) -> Recording:
     columns = {name: k for k, name in enumerate(names)}
     values = np.full((len(states), 2, len(names)), np.nan)
     for k, state in enumerate(states):
-        own = [columns[name] for name in state.names]
+        indices = [columns[name] for name in state.names]
         for level, numbers in enumerate(state.levels):
-            values[k, level, own] = numbers
+            values[k, level, indices] = numbers
     first = states[0].stamp
     epoch_unit = epoch(first)
     times = np.array([float(state.stamp - (first if epoch_unit else 0)) for state in states])

@@ -97,9 +97,9 @@ def _trajectories(source: Source) -> Recording:
 def _without_base(source: Source, location: Location, recording: Recording) -> Recording:
     """Return a recording with a note about joints of several coordinates that a message moves beside its joints."""
     for key in SEVERAL:
-        moved = _at(source, (*location, key))
-        if isinstance(moved, dict) and moved.get("points"):
-            names = ", ".join(str(name) for name in moved.get("joint_names") or ())
+        base_location = _at(source, (*location, key))
+        if isinstance(base_location, dict) and base_location.get("points"):
+            names = ", ".join(str(name) for name in base_location.get("joint_names") or ())
             place = f"{key}, line {source.line((*location, key))}"
             note = f"the motion of joints of several coordinates is left out: {names} ({place})"
             return dataclasses.replace(recording, notes=(*recording.notes, note))

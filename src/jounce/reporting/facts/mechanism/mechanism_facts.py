@@ -211,7 +211,7 @@ def _remarks(mechanism: Mechanism) -> list[str]:
     gears = ratio_words([name for name, joint in joints if is_bare_ratio(joint)])
     cams = cam_words([name for name, joint in joints if isinstance(joint, Cam)])
     belts = belt_words([name for name, joint in joints if isinstance(joint, Belt)])
-    return [words for words in (gears, cams, belts) if words]
+    return [phrase for phrase in (gears, cams, belts) if phrase]
 
 
 def _time(mechanism: Mechanism) -> dict[str, Any] | None:

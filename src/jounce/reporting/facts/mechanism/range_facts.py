@@ -63,8 +63,8 @@ def range_facts(mechanism: Mechanism, driver: str | None = None) -> dict[str, An
     linkage = recognized(mechanism, curve.driver)
     transmission = None
     if linkage is not None:
-        (least, least_at), (most, most_at) = extremes(linkage, low, high)
-        transmission = {"smallest": least, "smallest_at": least_at, "largest": most, "largest_at": most_at}
+        (lowest, least_at), (highest, most_at) = extremes(linkage, low, high)
+        transmission = {"smallest": lowest, "smallest_at": least_at, "largest": highest, "largest_at": most_at}
     sizes, values = _on_branch(curve)
     index = int(np.argmin(sizes))
     facts = {
@@ -135,8 +135,8 @@ def range_words(facts: Facts) -> str:
     if facts["type"]:
         lines.append(f"  {facts['type']}")
     if (transmission := facts["transmission"]) is not None:
-        least, largest = (math.degrees(transmission[end]) for end in ("smallest", "largest"))
-        lines.append(f"  transmission angle from {least:.6g} deg to {largest:.6g} deg")
+        lowest, highest = (math.degrees(transmission[end]) for end in ("smallest", "largest"))
+        lines.append(f"  transmission angle from {lowest:.6g} deg to {highest:.6g} deg")
     smallest = value_words(facts["smallest_singular_value_at"], unit)
     lines.append(f"  smallest singular value {facts['smallest_singular_value']:.3g}, at {driver} = {smallest}")
     return "\n".join([*lines, *(f"  warning: {warning}" for warning in facts["warnings"])])
