@@ -96,6 +96,8 @@ def test_gravity_and_payload_make_another_robot():
     assert np.array_equal(loaded.links["link_4"].inertia.tensor, whole.tensor)
     framed = chain(pin("x", "base", "a"), links=[jn.Link("a", BODY), jn.Link("b")][:1]).with_payload("base", load)
     assert framed.base_inertia.mass == 2.0
+    with pytest.raises(jn.errors.RobotError, match=r"^payload: must be a jn.Inertia, .* got 2.0"):
+        MIMIC.with_payload("link_4", 2.0)
 
 
 def test_locked_joints_hold_what_follows_them_too():
@@ -107,6 +109,8 @@ def test_locked_joints_hold_what_follows_them_too():
     expected, found = poses(MIMIC, values), poses(held, values)
     for link in MIMIC.link_names:
         np.testing.assert_allclose(found[link], expected[link], rtol=0, atol=1e-14)
+    with pytest.raises(jn.errors.RobotError, match=r"^locked: must be a mapping of joints to coordinates"):
+        MIMIC.locked([name])
 
 
 def test_a_fixed_joint_that_should_follow_stays_where_it_is():

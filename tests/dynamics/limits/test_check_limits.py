@@ -364,6 +364,13 @@ def test_limits_and_times_are_checked():
         check_limits(rigid, trajectory)
 
 
+@pytest.mark.parametrize("check", [check_limits, jn.dynamics.trajectory_torques])
+@pytest.mark.parametrize("given", ["motion.csv", np.zeros((5, 1))], ids=["file", "array"])
+def test_what_is_no_trajectory_is_refused_with_what_to_give(check, given):
+    with pytest.raises(jn.errors.TrajectoryError, match=r"^trajectory: must be a jn\.JointTrajectory, as"):
+        check(pendulum(), given)
+
+
 def test_limits_for_retiming_are_refused_with_what_to_give():
     robot = jn.load_robot("examples/robots/planar_arm.xml")
     laws = jn.JointTrajectory({"shoulder": "0.3*sin(3*t)"}, 0.0, 1.0)

@@ -190,6 +190,8 @@ def test_long_logs_are_smoothed_part_by_part_as_they_are_whole(monkeypatch):
 def test_what_is_refused_is_named():
     times = np.linspace(0, 1, 201)
     laws = jn.JointTrajectory({"a": "t"}, 0.0, 1.0)
+    with pytest.raises(TrajectoryError, match=r"must be a jn\.JointTrajectory"):
+        jn.smooth(np.sin(times), 1e-3)
     with pytest.raises(TrajectoryError, match="no joint goes through samples"):
         jn.smooth(laws, 1e-3)
     log = jn.JointTrajectory.from_samples(times, np.sin(times)[:, None], ["a"])

@@ -14,7 +14,7 @@ from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
 from jounce.dynamics.limits.local_maxima import local_maxima
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd, end_jumps, ends_of_jumps
 from jounce.dynamics.limits.shared_followers import SharedFollowers
-from jounce.dynamics.limits.trajectories import FollowedTrajectory, reason_not_movable
+from jounce.dynamics.limits.trajectories import FollowedTrajectory, checked_trajectory, reason_not_movable
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.robot.model.links_and_joints import Joint, Limits
@@ -38,7 +38,7 @@ ROUNDS = 8  # divisions of the step
 
 def check_limits(
     robot: Robot,
-    trajectory: JointTrajectory,
+    trajectory: JointTrajectory | Refused,
     limits: Mapping[str, Limits] | Refused | None = None,
     *,
     times: ArrayLike | None = None,
@@ -116,6 +116,7 @@ def check_limits(
     (False, [('velocity', 0.5, 0.0), ('torque', 1.2263, 0.0)])
     """
     drives, hand_over = flag("drives", drives, error=RobotError), flag("hand_over", hand_over, error=RobotError)
+    trajectory = checked_trajectory(trajectory)
     followed = FollowedTrajectory(robot, trajectory, loads=loads)
     resting, shared, count = followed.resting_joints, SharedFollowers.of(robot), len(robot.joint_names)
     names = (*robot.joint_names, *shared.names)

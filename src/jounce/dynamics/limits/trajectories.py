@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, seconds
+from jounce.base.shapes import ArrayLike, Refused, seconds
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, UnitWarning, flag, no_such
 from jounce.execution.chunks import in_chunks
 from jounce.robot.algorithms.carried_loads import CarriedLoad, LoadChange, LoadedRobot
@@ -159,7 +159,7 @@ def drives_note(drives: bool) -> str:
 
 def trajectory_torques(
     robot: Robot,
-    trajectory: JointTrajectory,
+    trajectory: JointTrajectory | Refused,
     rates: int = 0,
     *,
     times: ArrayLike | None = None,
@@ -213,6 +213,7 @@ def trajectory_torques(
     import xarray
 
     rates, drives = whole_number("rates", rates), flag("drives", drives, error=RobotError)
+    trajectory = checked_trajectory(trajectory)
     followed = FollowedTrajectory(robot, trajectory, loads=loads)
     instants = trajectory.times if times is None else np.atleast_1d(seconds("times", times, TrajectoryError))
     values = followed.torques(followed.coordinates(instants, rates + 2), instants, drives)
@@ -240,6 +241,14 @@ def reason_not_movable(robot: Robot, name: str) -> str:
     if joint.mimic is not None:
         return f"this joint follows {', '.join(joint.mimic.weights)}; leave it out"
     return "this joint is fixed; leave it out"
+
+
+def checked_trajectory(trajectory: JointTrajectory | Refused) -> JointTrajectory:
+    """Return a trajectory, after a check that it is one."""
+    if not isinstance(trajectory, JointTrajectory):
+        message = "must be a jn.JointTrajectory, as jn.load_trajectory or jn.JointTrajectory.from_samples gives it"
+        raise TrajectoryError(message, name="trajectory", value=type(trajectory).__name__)
+    return trajectory
 
 
 def check_measures(robot: Robot, trajectory: JointTrajectory) -> None:

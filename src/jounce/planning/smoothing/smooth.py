@@ -8,6 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Refused
+from jounce.dynamics.limits.trajectories import checked_trajectory
 from jounce.errors import RecordingWarning, SolveError, TrajectoryError, warn_caller
 from jounce.jet.turns import WHOLE_TURN
 from jounce.planning.pieces import SmoothPieces
@@ -86,7 +88,7 @@ class SmoothedTrajectory(JointTrajectory):
         return type(self), state
 
 
-def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
+def smooth(trajectory: JointTrajectory | Refused, deviation: float) -> SmoothedTrajectory:
     """Return a smooth motion within a deviation of the samples of a trajectory.
 
     Splines of degree 7 stay within the deviation of each sample. In each interval, the weight of jounce against
@@ -132,6 +134,7 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
     True
     """
     deviation = positive("deviation", deviation)
+    trajectory = checked_trajectory(trajectory)
     samples = {name: pair for name in trajectory.names if (pair := samples_of(trajectory, name)) is not None}
     if not samples:
         message = "no joint goes through samples; there is nothing to be smoothed"

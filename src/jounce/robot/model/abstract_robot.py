@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from jounce.base.display import Displayed
-from jounce.base.shapes import ArrayLike, Real, is_traced
+from jounce.base.shapes import ArrayLike, Real, Refused, is_traced
 from jounce.errors import RobotError, check_name, did_you_mean
 from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers, vector_numbers
 from jounce.robot.model.couplings import BallDrive, Coupling, Tendon, check_coupling
@@ -190,7 +190,7 @@ class AbstractRobot(Displayed, abc.ABC):
         """Return the tree without closures, with independent coordinates."""
         return self.changed(closures=())
 
-    def with_payload(self: Made, link: str, payload: Inertia) -> Made:
+    def with_payload(self: Made, link: str, payload: Inertia | Refused) -> Made:
         """Return the robot with a load fixed to a link, given in the frame of that link: Q_SU of Negrean 2025, 125.
 
         Raises
@@ -199,6 +199,8 @@ class AbstractRobot(Displayed, abc.ABC):
             If the link does not exist.
         """
         check_name("link", link, self.links, RobotError, name="link")
+        if not isinstance(payload, Inertia):
+            raise RobotError("must be a jn.Inertia, in the frame of the link", name="payload", value=payload)
         inertia = self.links[link].inertia
         combined = payload if inertia is None else Inertia.total([inertia, payload])
         links = {**self.links, link: dataclasses.replace(self.links[link], inertia=combined)}
@@ -257,7 +259,7 @@ class AbstractRobot(Displayed, abc.ABC):
         links = {**self.links, link: dataclasses.replace(self.links[link], inertia=inertia)}
         return self.changed(links=list(links.values()))
 
-    def locked(self: Made, positions: Mapping[str, float]) -> Made:
+    def locked(self: Made, positions: Mapping[str, float] | Refused) -> Made:
         """Return the robot with joints fixed at given coordinates, rad or m, together with their followers.
 
         Raises
@@ -265,6 +267,9 @@ class AbstractRobot(Displayed, abc.ABC):
         RobotError
             If the joint does not exist, is fixed, or follows another.
         """
+        if not isinstance(positions, Mapping):
+            message = "must be a mapping of joints to coordinates, as {'elbow': 0.5}"
+            raise RobotError(message, name="locked", value=positions)
         for name, value in positions.items():
             check_name("moving joint", name, self.joint_names, RobotError, name="locked")
             finite_numbers(f"locked.{name}", value, ())
