@@ -137,6 +137,23 @@ def test_many_periods_are_no_noise(count, periods):
     assert np.sqrt(np.mean((derivative(law, inner, 3) - jerk) ** 2)) < 0.05 * 0.5 * rate**3
 
 
+@pytest.mark.parametrize("rate, size", [(100, 1e-4), (500, 2e-5)])
+def test_standard_errors_are_those_of_many_logs(rate, size):
+    times = np.arange(0, 5, 1 / rate)
+    inner = np.flatnonzero((times > 1) & (times < 4))
+    exact = np.stack([0.5 * 6.28**k * np.sin(6.28 * times + 1 + k * np.pi / 2) for k in range(4)])
+    squares, stated = [], []
+    for seed in range(12):
+        values = exact[0] + size * np.random.default_rng(seed).normal(size=len(times))
+        motion, _, found = law_of(times, values, 6 * size)
+        errors = motion.derivatives(times, 3)[:, :, 0].T - exact
+        squares.append([(errors[:, inner] ** 2).mean(axis=1), (errors[:, [0, -1]] ** 2).mean(axis=1)])
+        stated.append(found.standard_errors)
+    within, ends = np.sqrt(np.mean(squares, axis=0)) / np.mean(stated, axis=0)
+    assert ((within > 0.25) & (within < 1.1)).all()  # a sine is smoother than a motion whose jounce is noise
+    assert (np.abs(np.log(ends / [2.7, 6.7, 6.8, 2.8])) < 0.4).all()
+
+
 def test_a_deviation_below_the_noise_is_kept_where_it_can_be():
     times = np.linspace(0, 3, 601)
     values = np.sin(2 * times) + 1e-4 * np.random.default_rng(2).normal(size=601)

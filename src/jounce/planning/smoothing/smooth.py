@@ -49,12 +49,17 @@ class SmoothedJoint:
         Start and end of each dwell, s.
     cutoff : tuple of (float, float)
         Lowest and highest cutoff frequency, above which the motion does not follow the samples, Hz.
+    standard_errors : tuple of float
+        Standard deviations of position, velocity, acceleration and jerk that follow from the noise, in SI units, where
+        the motion is fastest. Higher derivatives have none: of the jounce only its integral is known. At the first and
+        the last sample of a log that does not rest there, they are 2.7, 6.7, 6.8 and 2.8 times as large.
     """
 
     noise: float
     away: float
     dwells: tuple[tuple[float, float], ...]
     cutoff: tuple[float, float]
+    standard_errors: tuple[float, ...]
 
 
 class SmoothedTrajectory(JointTrajectory):
@@ -262,7 +267,7 @@ def smoothed_samples(
     sigma = noise_of(times, values)
     if not np.ptp(values):
         rests = [Dwell(0, len(times) - 1, float(values[0]))]
-        estimates = [IntervalEstimate(float(times[0]), float(times[-1]), 1.0, 1.0, 0.0)]
+        estimates = [IntervalEstimate(float(times[0]), float(times[-1]), len(times), 1.0, 1.0, 0.0)]
     else:
         rests, estimates = _dwells_and_estimates(times, values, sigma)
         rests = [_fitting(times, values, dwell, deviation) for dwell in rests]
@@ -278,7 +283,8 @@ def smoothed_samples(
     intervals = tuple((float(times[d.first]), float(times[d.last])) for d in rests)
     rates = [estimate.cutoff / (2 * np.pi) for estimate in estimates]
     noise = max(sigma, float(np.median([estimate.noise for estimate in estimates])))
-    return law, SmoothedJoint(noise, curve.away, intervals, (min(rates), max(rates)))
+    errors = np.max([estimate.standard_errors for estimate in estimates], axis=0)
+    return law, SmoothedJoint(noise, curve.away, intervals, (min(rates), max(rates)), tuple(errors.tolist()))
 
 
 def _dwells_and_estimates(

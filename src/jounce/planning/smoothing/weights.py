@@ -36,6 +36,8 @@ class IntervalEstimate:
     ----------
     start, stop : float
         Ends of the interval, s.
+    count : int
+        Number of its samples.
     weight : float
         Weight of the integral of the squared jounce against the sum of squared distances, s^7.
     cutoff : float
@@ -46,9 +48,21 @@ class IntervalEstimate:
 
     start: float
     stop: float
+    count: int
     weight: float
     cutoff: float
     noise: float
+
+    @property
+    def standard_errors(self) -> Float[np.ndarray, " derivative"]:
+        """Standard deviations of position to jerk, given the samples, far from the ends.
+
+        With the spectral density ``s`` of the noise, ``noise^2 (stop - start)/count``, that of what is not known of the
+        motion is ``s/(1 + (w/cutoff)^8)``, and of its k-th derivative ``w^(2k)`` times that.
+        """
+        powers = 2 * np.arange(PENALIZED) + 1
+        density = self.noise**2 * (self.stop - self.start) / self.count
+        return np.sqrt(density * self.cutoff**powers / (2 * PENALIZED * np.sin(np.pi * powers / (2 * PENALIZED))))
 
 
 def interval_estimates(
@@ -116,9 +130,8 @@ def _estimate(times: np.ndarray, values: np.ndarray, cells: int) -> IntervalEsti
     cell = span / cells
     weight = float(np.exp(logarithm)) * cell ** (2 * PENALIZED - 1)
     cutoff = float((count / span / weight) ** (1 / (2 * PENALIZED)))
-    return IntervalEstimate(
-        float(times[0]), float(times[-1]), weight, cutoff, float(np.sqrt(residual / (count - PENALIZED)))
-    )
+    noise = float(np.sqrt(residual / (count - PENALIZED)))
+    return IntervalEstimate(float(times[0]), float(times[-1]), count, weight, cutoff, noise)
 
 
 def _without_cubic(times: np.ndarray, values: np.ndarray) -> Float[np.ndarray, " sample"]:
