@@ -94,6 +94,15 @@ def test_an_angle_within_one_turn_is_refused(angle):
         jn.smooth(log, 5e-3)
 
 
+def test_samples_beside_a_gap_are_no_outliers():
+    times = np.linspace(0.0, 4.0, 801)
+    times = times[(times < 1.5) | (times > 2.5)]
+    values = np.sin(3 * times) + 1e-5 * np.random.default_rng(2).normal(size=times.size)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", jn.errors.RecordingWarning)
+        jn.smooth(jn.JointTrajectory.from_samples(times, values[:, None], ["a"]), 1e-4)
+
+
 @pytest.mark.parametrize("name", MOTIONS)
 def test_samples_that_steps_of_an_encoder_or_a_rest_make_equal_are_not_called_old(name):
     clean, _, stop = MOTIONS[name]

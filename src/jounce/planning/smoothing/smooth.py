@@ -217,7 +217,8 @@ def _outlier(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sa
     """Return a warning of samples far from their neighbors, with a remedy, or an empty string."""
     steps = np.diff(times)
     interpolated = (values[:-2] * steps[1:] + values[2:] * steps[:-1]) / (steps[1:] + steps[:-1])
-    gaps = np.abs(values[1:-1] - interpolated)
+    uneven = steps[1:] * steps[:-1] / np.median(steps) ** 2  # beside gaps, lines are far from a curved motion
+    gaps = np.abs(values[1:-1] - interpolated) / np.maximum(uneven, 1.0)
     padded = np.pad(gaps, NEIGHBORS)
     nearby = [padded[NEIGHBORS + k : len(gaps) + NEIGHBORS + k] for k in range(-NEIGHBORS, NEIGHBORS + 1) if abs(k) > 1]
     outliers = np.flatnonzero((gaps > OUTLYING * np.max(nearby, axis=0)) & (gaps > OUTSIDE * deviation))
