@@ -5,6 +5,7 @@ from functools import partial
 import jax
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import jounce as jn
 from jounce.dynamics.forward.initial_state import consistent_start
@@ -42,3 +43,88 @@ def test_series_of_the_lowest_orders_find_the_way_too(order):
     found = jn.simulate(spring, [0.0, 0.7], order=2, method=jn.Taylor(order), tolerance=1e-10)
     expected = 0.5 + 0.5 * np.cos(2.0 * 0.7)  # x'' = -4 (x - 0.5) from rest at 1
     np.testing.assert_allclose(found.outputs["x"][-1, 0, 0], expected, atol=1e-7)
+
+
+def free_linkage(length, base, inertias, **bodies):
+    """A crank and a member that follows it, released with an angle and a speed of the crank."""
+    crank = jn.Body([0, 0], "angle", mass=1.0, inertia=inertias[0], center_of_mass=[base, 0])
+    return {
+        "space": "planar",
+        "gravity": [0, -9.81],
+        "parameters": {"angle": 1.0, "speed": 0.0, "a": length},
+        "bodies": {"crank": crank, **bodies},
+        "initial": {"turn": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "angle + speed*t")},
+        "outputs": {"angle": jn.outputs.AngleOutput("crank")},
+    }
+
+
+def parallelogram():
+    """Returns the mechanism, and as functions of the angle its inertia, the derivative of that, and its torque."""
+    pin = jn.planar.Revolute
+    parts = free_linkage(
+        0.1,
+        0.0,
+        [1e-3],
+        rocker=jn.Body([0.3, 0], "angle", mass=1.2, inertia=2e-3),
+        coupler=jn.Body(["a*cos(angle)", "a*sin(angle)"], mass=0.5, inertia=1e-3, center_of_mass=[0.1, 0.02]),
+    )
+    joints = {
+        "O": pin(("ground", "crank"), [0, 0], [0, 0]),
+        "Q": pin(("ground", "rocker"), [0.3, 0], [0, 0]),
+        "A": pin(("crank", "coupler"), ["a", 0], [0, 0]),
+        "B": pin(("coupler", "rocker"), [0.3, 0], ["a", 0]),
+    }
+    inertia = 3e-3 + 0.5 * 0.1**2
+    motion = lambda x: inertia, lambda x: 0.0, lambda x: -9.81 * 0.5 * 0.1 * np.cos(x)
+    return jn.Mechanism(**parts, joints=joints), motion
+
+
+def folding_slider_crank():
+    """As `parallelogram`, with crank and rod of one length: the slider stands on the axis of the crank when folded."""
+    pin, a = jn.planar.Revolute, 0.2
+    parts = free_linkage(
+        a,
+        0.1,
+        [3e-3],
+        rod=jn.Body(["a*cos(angle)", "a*sin(angle)"], "-angle", mass=0.7, inertia=2e-3, center_of_mass=[0.1, 0]),
+        slider=jn.Body(["2*a*cos(angle)", 0], mass=0.5, inertia=1e-3),
+    )
+    joints = {
+        "O": pin(("ground", "crank"), [0, 0], [0, 0]),
+        "A": pin(("crank", "rod"), ["a", 0], [0, 0]),
+        "P": pin(("rod", "slider"), ["a", 0], [0, 0]),
+        "guide": jn.planar.Prismatic(("ground", "slider"), [0, 0], [0, 0], [1, 0], [1, 0]),
+    }
+
+    def inertia(x):
+        sine, cosine = np.sin(x) ** 2, np.cos(x) ** 2
+        return 3e-3 + 0.01 + 2e-3 + a * a * (0.7 * (2.25 * sine + 0.25 * cosine) + 0.5 * 4.0 * sine)
+
+    slope = a * a * (0.7 * 2.0 + 0.5 * 4.0)
+    motion = inertia, lambda x: slope * np.sin(2 * x), lambda x: -9.81 * (0.1 + 0.7 * 0.1) * np.cos(x)
+    return jn.Mechanism(**parts, joints=joints), motion
+
+
+@pytest.mark.parametrize("linkage", [parallelogram, folding_slider_crank])
+def test_free_linkages_pass_their_change_points(linkage):
+    """Whatever the distance from them at which a step happens to begin; the reference is the motion in one angle."""
+    mechanism, (inertia, slope, torque) = linkage()
+    time = np.linspace(0, 3, 31)
+    starts = [
+        (1.0, 2.5),
+        (1.0, 3.0),
+        (1.0, -4.0),
+        (0.557, -13.4),
+        (-0.877, -11.8),
+        (0.599049839449549, -2.241975255066697),
+    ]
+    starts += [(float(a), float(s)) for a, s in np.random.default_rng(5).uniform([0.3, -15], [1.2, 15], (14, 2))]
+    for angle, speed in starts:
+        motion = jn.simulate(mechanism.with_parameters(angle=angle, speed=speed), time, order=0)
+
+        def rates(_, state):
+            return state[1], (torque(state[0]) - 0.5 * slope(state[0]) * state[1] ** 2) / inertia(state[0])
+
+        exact = solve_ivp(rates, (0, 3), (angle, speed), "DOP853", time, rtol=1e-12, atol=1e-12).y[0]
+        np.testing.assert_allclose(motion.outputs["angle"][:, 0], exact, rtol=0, atol=3e-7)
+        assert np.ptp(motion.energy) < 1e-8

@@ -303,6 +303,7 @@ def _attempt(
         farthest = jnp.where(reach > longest, jnp.minimum(jnp.minimum(reach, longest / SHORT), duration), jnp.abs(step))
         short = steps_counted(current.short, step, duration)
         limiting = jnp.where(look.limiting >= 0, look.limiting, current.blocked)
+        singular = near_singular(equations, inverse)
         advanced = IntegratorState(
             time=time,
             rest=rest,
@@ -310,7 +311,7 @@ def _attempt(
             refused=jnp.zeros_like(current.refused),
             outcome=outcome,
             mobility=lookahead.mobility_of(equations, inverse),
-            singular=near_singular(equations, inverse),
+            singular=singular,
             blocked=jnp.where(short > 0, limiting, -1),
             angles=measured(counted, state),
             longest=jnp.maximum(current.longest, farthest),
@@ -318,8 +319,10 @@ def _attempt(
             short=short,
             balance=balance._replace(broken=balance.broken & (short > 0)),
         )
+        # a step that would end next to a singular position is tried again as one that passes it
         refused = current._replace(
-            refused=current.refused + 1,
+            refused=current.refused + jnp.where(singular & ~current.singular, 0, 1),
+            singular=current.singular | singular,
             outcome=outcome,
             blocked=jnp.where(look.resolved, current.blocked, look.limiting),
             balance=current.balance._replace(broken=broken),

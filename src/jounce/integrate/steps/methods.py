@@ -186,7 +186,7 @@ def in_proportion(allowed: Lanes, step: Lanes, usual: Lanes) -> Lanes:
 
 
 def furthest(
-    sizes: Sizes, allowed: Lanes, usual: Lanes | None = None, duration: Number | None = None
+    sizes: Sizes, allowed: Lanes, usual: Lanes | None = None, duration: Number | None = None, power: Any = 2.0
 ) -> tuple[Bool[Numbers, "order batch"], Lanes]:
     """Return the coefficients of series to keep, from order zero on, for the longest step, and its length, s.
 
@@ -197,10 +197,11 @@ def furthest(
     allowed : array of shape (batch,)
         Allowed error of a step.
     usual : array of shape (batch,), optional
-        Usual length of steps, s; shorter steps are allowed an error reduced by the square of the ratio, since rounding
-        beside a jump grows from term to term and uses up the whole allowance.
+        Usual length of steps, s; shorter steps are allowed an error reduced by a power of the ratio.
     duration : float, optional
         Duration of the run, s; the velocity error of a step, from its accelerations, acts until the end of the run.
+    power : float or array of shape (batch,), default 2.0
+        The power: a square, since rounding beside a jump grows from term to term and uses up the whole allowance.
     """
     orders = np.arange(1.0, len(sizes) + 1)
     roots = -jnp.log(jnp.maximum(sizes, 1e-300)) / orders[:, None]  # logarithms: powers would cost far more
@@ -213,8 +214,9 @@ def furthest(
         lasting = (highest + 1.0) * steps - np.log(highest * (highest + 1.0)) - jnp.log(duration)
         steps = jnp.minimum(steps, lasting / highest)
     if usual is not None:
-        shorter = (cuts + 1.0) * steps - 2.0 * jnp.log(jnp.maximum(usual, 1e-300))[None]
-        steps = jnp.minimum(steps, shorter / (cuts - 1.0))
+        powers = jnp.broadcast_to(jnp.asarray(power, float), usual.shape)[None]
+        shorter = (cuts + 1.0) * steps - powers * jnp.log(jnp.maximum(usual, 1e-300))[None]
+        steps = jnp.minimum(steps, shorter / (cuts + 1.0 - powers))
     best = jnp.argmax(steps, axis=0)
     used = np.arange(len(sizes))[:, None] <= best[None] + LOWEST_ORDER
     return used, jnp.exp(jnp.max(steps, axis=0))
@@ -264,13 +266,15 @@ class Taylor(AbstractMethod):
 
         Near a singular position the higher coefficients are rounding, and the truncated series is much better. Its
         allowed error is larger, so that the step passes the singular position: rounding grows with the inverse of the
-        distance from it, and steps that keep the error small would only approach it.
+        distance from it, and steps that keep the error small would only approach it. If the step is short, its allowed
+        error is reduced in proportion, which bounds that of the velocities.
         """
         if self.step is not None:
             return super().prepared(expansion, length, tolerance, singular, usual)
         sizes = coefficient_sizes(expansion, length)
-        allowed = jnp.where(singular & _is_growing_rounding(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
-        used, step = furthest(sizes, allowed, usual)
+        passing = singular & _is_growing_rounding(sizes)
+        allowed = jnp.where(passing, jnp.maximum(tolerance, ROUGH), tolerance)
+        used, step = furthest(sizes, allowed, usual, power=jnp.where(passing, 1.0, 2.0))
 
         def cut(part: Any) -> Any:
             return jnp.where(used[:, None, None], part, 0.0)
