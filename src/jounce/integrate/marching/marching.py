@@ -29,7 +29,7 @@ REFUSED = 0.45
 SHORT = 1.0 / 4.0  # of the longest step so far: shorter steps are allowed smaller errors, see `furthest`
 STUCK = 64  # steps in a row that hardly advance and end a run: a force switches without end
 AT_LEAST, AT_MOST = 64, 512  # least and most steps tried in a call; progress and events are checked between calls
-NUMBERS = 2**15  # numbers of polynomials in a call: to allocate more takes longer than another call
+NUMBERS = 2**16  # numbers of polynomials in a call: to allocate more takes longer than another call
 FEW_RUNS, MANY_RUNS = 8, 64  # runs that XLA marches side by side; more do not fit into the cache
 STUBBORN = 3  # refusals in a row that a smooth motion does not need: the step may begin at a kink
 
