@@ -567,3 +567,22 @@ def test_bodies_of_files_within_files_are_counted(tmp_path, repeated):
 def test_a_few_repeated_bodies_are_a_robot(tmp_path):
     text = '<replicate count="3" offset="0 1 0"><body name="b"><joint/><geom size="0.1"/></body></replicate>'
     assert len(load_robot(written(tmp_path, text)).joint_names) == 3
+
+
+@pytest.mark.parametrize("given", [(a, b) for a in ("ix", "x", "i") for b in ("ix", "x", "i", "")])
+@pytest.mark.parametrize("settings", ['fusestatic="true"', 'fusestatic="true" inertiafromgeom="true"'])
+def test_masses_of_fused_bodies_are_those_of_mujoco_or_refused(tmp_path, settings, given):
+    parts = {"i": '<inertial mass="2" pos="0 0 0" diaginertia="0.1 0.1 0.1"/>', "x": '<geom size="0.1" mass="0.7"/>'}
+    inner, outer = ("".join(parts[key] for key in own) for own in reversed(given))
+    path = tmp_path / "fused.xml"
+    path.write_text(
+        f'<mujoco><compiler {settings}/><worldbody><body name="a"><joint/>{outer}<body name="b" pos="0.1 0 0">'
+        f"{inner}</body></body></worldbody></mujoco>"
+    )
+    mass = float(mujoco.MjModel.from_xml_path(str(path)).body_mass.sum())
+    whole = sum(2.0 if "i" in own and ("x" not in own or "geom" not in settings) else 0.7 for own in given if own)
+    if mass == whole:
+        assert load_robot(path).mass == pytest.approx(mass, rel=1e-12)
+    else:
+        with pytest.raises(RobotFileError, match=r"MuJoCo drops the inertia of a body without shapes;"):
+            load_robot(path)

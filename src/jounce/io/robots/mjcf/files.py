@@ -152,6 +152,25 @@ def line_of(text: str) -> int | None:
     return None if match is None else int(match[1])
 
 
+def check_fusion(spec: Any, mujoco: Any, root: Element) -> None:
+    """Raise an error for a given inertia that MuJoCo drops where it fuses bodies without joints with their parents."""
+    always = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    if not (always and spec.compiler.fusestatic):
+        return
+    for body in spec.bodies:
+        fused, pending = [], list(body.bodies) if len(body.joints) else []
+        while pending:
+            child = pending.pop()
+            if not len(child.joints):
+                fused.append(child)
+                pending += list(child.bodies)
+        shaped = any(len(child.geoms) for child in fused)
+        for part in [body, *fused] if shaped else fused:
+            if part.explicitinertial and not len(part.geoms):
+                message = "with fusestatic and inertiafromgeom, MuJoCo drops the inertia of a body without shapes"
+                raise root.error(f"{message}; remove fusestatic", f"bodies.{part.name}")
+
+
 def check_assets(spec: Any, parts: Iterable[Element], allow: Iterable[str | PathLike[str]] = ()) -> None:
     """Raise an error for meshes and pictures in forbidden places, or that are no files: MuJoCo reads anything.
 

@@ -18,7 +18,7 @@ from jounce.io.robots.elements.faults import FIXED_ALREADY, LEAVE, MOCAP, Faults
 from jounce.io.robots.elements.followers import with_room
 from jounce.io.robots.elements.xml_elements import Element
 from jounce.io.robots.mjcf.drives import Drives, works
-from jounce.io.robots.mjcf.files import check_assets, check_copies, included, line_of, quiet_mujoco
+from jounce.io.robots.mjcf.files import check_assets, check_copies, check_fusion, included, line_of, quiet_mujoco
 from jounce.io.robots.mjcf.left_out import SkippedPart, left_out_of_model, left_out_of_spec, note_shells
 from jounce.io.robots.mjcf.ties import NO_CLOSURE, JointRelations, linear_tendons, tied_tendons
 from jounce.rigid.inertia import Inertia
@@ -88,6 +88,7 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
         with quiet_mujoco(mujoco):
             spec = mujoco.MjSpec.from_file(root.path)
             scaled = spec.compiler.fusestatic and getattr(spec.compiler, "settotalmass", 0.0) > 0  # deprecated
+            check_fusion(spec, mujoco, root)
             unread = left_out_of_spec(spec, mujoco)
             if not works(spec.option.disableflags, "EQUALITY", mujoco):
                 for equality in spec.equalities:
