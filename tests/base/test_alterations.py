@@ -67,13 +67,13 @@ def test_users_classes_alter_nothing():
 
 
 def test_programs_of_files_that_were_written_meanwhile_have_no_names(monkeypatch):
-    monkeypatch.setattr(structure, "BEGUN", time.time() - 1e10)
+    monkeypatch.setattr(structure, "IMPORT_TIME", time.time() - 1e10)
     structure._changed_file.cache_clear()
     try:
         assert str(structure._changed_file()).endswith(".py")
     finally:
         structure._changed_file.cache_clear()
-    assert time.time() >= alterations.BEGUN
+    assert time.time() >= alterations.IMPORT_TIME
 
 
 def test_writing_the_schema_alters_nothing():

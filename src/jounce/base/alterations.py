@@ -12,7 +12,7 @@ import types
 from collections.abc import Collection
 from typing import Any
 
-BEGUN = time.time()  # before other modules of this package are imported
+IMPORT_TIME = time.time()  # before other modules of this package are imported
 PACKAGE = __name__.partition(".")[0]
 TABLES = dict, list, set  # types of constants that can be changed in place
 REGISTERED = ("_REGISTRY",)  # tables of user classes, which have no cache keys anyway
@@ -30,7 +30,7 @@ def note(ready: Collection[str] = ()) -> None:
     modules = sys.modules
     for name in [name for name in list(modules) if name.startswith(f"{PACKAGE}.") and name not in _held]:
         module, package = modules[name], ".".join(name.split(".", 2)[:2])
-        if (_is_begun(module) and name not in ready) or (_is_begun(modules.get(package)) and package not in ready):
+        if (_is_loading(module) and name not in ready) or (_is_loading(modules.get(package)) and package not in ready):
             continue
         space = vars(module)
         _held[name] = module, dict(space), _tables(space)
@@ -65,7 +65,7 @@ def altered() -> str | None:
     return None
 
 
-def _is_begun(module: Any) -> bool:
+def _is_loading(module: Any) -> bool:
     """Return whether the import of a module has begun but not ended."""
     return getattr(getattr(module, "__spec__", None), "_initializing", False)
 

@@ -85,7 +85,7 @@ class PrivateFolder:
     def remove(self, name: str) -> None:
         """Remove a file or link, if possible."""
         with contextlib.suppress(OSError):
-            os.unlink(*self._at(name), **self._here())
+            os.unlink(*self._at(name), **self._folder_option())
 
     def files(self, ending: str) -> Iterator[tuple[float, int, str]]:
         """Yield the time of last use, the size in bytes and the name of each file with a suffix."""
@@ -93,11 +93,11 @@ class PrivateFolder:
             for name in os.listdir(self.path if self._descriptor is None else self._descriptor):  # noqa: PTH208
                 with contextlib.suppress(OSError):  # another process may remove files
                     if name.endswith(ending):
-                        status = os.stat(*self._at(name), follow_symlinks=False, **self._here())
+                        status = os.stat(*self._at(name), follow_symlinks=False, **self._folder_option())
                         yield status.st_mtime, status.st_size, name
 
     def _opened(self, name: str, flags: int) -> int:
-        return os.open(*self._at(name), flags, 0o600, **self._here())
+        return os.open(*self._at(name), flags, 0o600, **self._folder_option())
 
     def _replace(self, old: str, new: str) -> None:
         if self._descriptor is None:
@@ -108,7 +108,7 @@ class PrivateFolder:
     def _at(self, name: str) -> tuple[str | Path]:
         return (self.path / name,) if self._descriptor is None else (name,)
 
-    def _here(self) -> dict[str, int]:
+    def _folder_option(self) -> dict[str, int]:
         return {} if self._descriptor is None else {"dir_fd": self._descriptor}
 
     def _check(self, status: os.stat_result) -> None:

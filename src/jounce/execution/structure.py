@@ -23,7 +23,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.base.alterations import BEGUN, altered
+from jounce.base.alterations import IMPORT_TIME, altered
 from jounce.base.jax_internals import trace_settings as settings
 from jounce.execution.llvm import machine
 
@@ -153,7 +153,7 @@ def _files() -> list[Path]:
 def _changed_file() -> str | None:
     """Return a file that was written after this process began, and so may differ from memory; otherwise None."""
     result = {str(file): file.stat() for file in _files()}
-    return next((n for n, x in result.items() if max(x.st_mtime, x.st_ctime) > BEGUN - MARGIN), None)
+    return next((n for n, x in result.items() if max(x.st_mtime, x.st_ctime) > IMPORT_TIME - MARGIN), None)
 
 
 @lru_cache(maxsize=1)

@@ -72,7 +72,7 @@ class Study:
             self.progress(self.done, self.total, self.least)
 
     @property
-    def here(self) -> Float[np.ndarray, " parameter"]:
+    def given_point(self) -> Float[np.ndarray, " parameter"]:
         """The point of the given mechanism, clipped to the bounds."""
         values = self.mechanism.parameter_values
         return self.problem.point_of({name: values[name] for name in self.problem.names})
@@ -86,9 +86,9 @@ class Study:
             If no design can be assembled and moved, or conditions cannot be fulfilled.
         """
         self._note_bounds()
-        points, lock = [self.here], None
+        points, lock = [self.given_point], None
         try:
-            self.problem.evaluate(self.here)
+            self.problem.evaluate(self.given_point)
         except Locked as error:
             points, lock = [], error
         if starts > 1 or not points:

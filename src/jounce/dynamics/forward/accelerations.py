@@ -247,7 +247,7 @@ class Equations(Module):
         solution = -solve(jnp.concatenate([as_column(forces, scale), second]))
         return by_body(solution[:columns], scale), solution[columns:]
 
-    def begun(
+    def solved_at_start(
         self, solve: Callable[[Rows], Rows], state: State, time: Instants, forces: ByBody, second: Rows
     ) -> tuple[ByBody, Rows, Callable[[ByBody, Rows], tuple[ByBody, Rows]]]:
         """Return accelerations and multipliers of a state, and the solver for their coefficients of higher orders.
@@ -359,7 +359,7 @@ def expand(
 
     trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((len(equations.system.row_scale), lanes))
     forces, second, _ = program(*state, *trial, time)
-    acceleration, multipliers, solution = equations.begun(known_inverse.solve, state, time, forces, second)
+    acceleration, multipliers, solution = equations.solved_at_start(known_inverse.solve, state, time, forces, second)
     recursion = Recursion(program, (*state, acceleration, multipliers, time), order - 1, reversible=reversible)
     shifts = equations.pose_type.shifts
 

@@ -197,13 +197,15 @@ def _meeting(pattern: Pattern, owned: Int[np.ndarray, " row"], stride: int) -> M
     rows = zip(
         np.asarray(pattern.bodies).tolist(), np.asarray(pattern.entry_indices).tolist(), owned.tolist(), strict=True
     )
-    for touched, columns, here in rows:
-        entries[here] = {}
+    for touched, columns, multiplier in rows:
+        entries[multiplier] = {}
         for body, block in zip(touched, columns, strict=True):
             if body < count:
-                entries[here][body] = {i: mass + position for i, position in enumerate(block)}
+                entries[multiplier][body] = {i: mass + position for i, position in enumerate(block)}
                 for i, position in enumerate(block):
-                    entries[body * stride + i].setdefault(here // stride, {})[here % stride] = mass + position
+                    entries[body * stride + i].setdefault(multiplier // stride, {})[multiplier % stride] = (
+                        mass + position
+                    )
     return entries
 
 

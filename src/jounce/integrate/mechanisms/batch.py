@@ -178,8 +178,8 @@ class _Runs:
         self._expansion = max(derivatives_of_motion(parametric.mechanism, order), 2)  # 2 for the count of revolutions
         self._current: Any = None
         self._values: dict[int, np.ndarray] = {}  # of each group, (runs, time, order + 1, components, outputs)
-        self._begun = np.full(len(rows), instants[0])  # start of the last step
-        self._angles: dict[int, np.ndarray] = {}  # series of turning outputs at that time
+        self._step_start = np.full(len(rows), instants[0])  # of the last step of each run
+        self._angles: dict[int, np.ndarray] = {}  # series of turning outputs at the start of the last step
         outputs = parametric.model.system.outputs
         self._measuring = [index for index, group in enumerate(outputs) if measures_angle(group)]
         self._turns: dict[int, np.ndarray] = {}  # angles about axes at the end of the last step, (instances, runs)
@@ -266,8 +266,8 @@ class _Runs:
     def _counted(self, runs: np.ndarray, steps: DenseOutput) -> dict[int, np.ndarray]:
         """Return the series of turning outputs at the starts of steps, revolutions counted; steps and runs last."""
         counted = {}
-        time = np.concatenate([self._begun[runs][None], steps.start])
-        self._begun[runs] = time[-1]
+        time = np.concatenate([self._step_start[runs][None], steps.start])
+        self._step_start[runs] = time[-1]
         _, outputs = self._made.at(np.tile(runs, len(steps.start)))
         for index, group in enumerate(outputs):
             if group.element.turning and not measures_angle(group):

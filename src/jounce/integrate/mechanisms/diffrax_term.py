@@ -177,6 +177,6 @@ def _rates(time: Any, state: State, equations: Equations) -> tuple[State, State]
     trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((equations.system.shape[0], 1))
     forces, second, attitude_rate = equations.balance(state, *trial, clock)
     factor, shifts = equations.factored(state, clock), equations.pose_type.shifts
-    acceleration, _, _ = equations.begun(factor.solve, state, clock, forces, second)
+    acceleration, _, _ = equations.solved_at_start(factor.solve, state, clock, forces, second)
     rate = State(state.velocity, attitude_rate, acceleration[:shifts], acceleration[shifts:])
     return jax.tree.map(lambda part: part[..., 0], rate), state

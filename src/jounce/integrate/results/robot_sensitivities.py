@@ -115,7 +115,7 @@ def traced_robot_motion(
     problem = with_fields(numeric, equations=with_fields(numeric.equations, tree=robot.tree))
     start, length = _divided(numeric, simulation)
     first = jax.tree.map(lambda x: jnp.asarray(x)[0, 0, :, None], simulation.steps.polynomial)
-    first = _begun(robot, problem, first, options.get("state"))
+    first = _traced_start(robot, problem, first, options.get("state"))
     instants = simulation.time
     _, indices = steps_of(simulation.steps._replace(start=start, length=length), instants)
     elapsed = instants - start[indices]
@@ -127,7 +127,7 @@ def traced_robot_motion(
     return TracedRobotMotion(robot, instants, simulation.order, with_value(derivatives, simulation.q), simulation)
 
 
-def _begun(robot: Robot, problem: RobotProblem, first: RobotState, state: Any) -> RobotState:
+def _traced_start(robot: Robot, problem: RobotProblem, first: RobotState, state: Any) -> RobotState:
     """Return the initial state with its tracers; driven joints follow their laws."""
     if not is_traced(state):
         return first

@@ -247,7 +247,7 @@ class AbstractDetector(abc.ABC):
     def __init__(self, event: Any):
         self.event = event
         self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
-        self._begun = False
+        self._started = False
 
     @abc.abstractmethod
     def detect(self, part: Any) -> list[tuple[int, float]]:
@@ -260,13 +260,13 @@ class AbstractDetector(abc.ABC):
         events = []
         for (k, begin, end), coefficients in zip(pieces, (values - self.event.value) @ INTERPOLATION.T, strict=True):
             length = part.length[k]
-            for root, direction in crossings(coefficients, first=not self._begun):
+            for root, direction in crossings(coefficients, first=not self._started):
                 after, sense = float((begin + root * (end - begin)) * length), float(direction * np.sign(length))
                 again = self._last[1] == sense and abs(part.start[k] + after - self._last[0]) < 2 * EDGE * abs(length)
                 self._last = float(part.start[k] + after), sense
                 if not again and self.event.direction * sense >= 0:
                     events.append((k, after))
-            self._begun = True
+            self._started = True
         return events
 
 

@@ -150,9 +150,9 @@ class Builder:
 
     def fail(self, message: str, line: int) -> MechanismFileError:
         """Return an error at a line, named after the entry being built."""
-        return MechanismFileError(message, path=self.source.path, line=line, name=dotted(self._here()) or None)
+        return MechanismFileError(message, path=self.source.path, line=line, name=dotted(self._location()) or None)
 
-    def _here(self) -> Location:
+    def _location(self) -> Location:
         if not self._stack:
             return ()
         container, location = self._stack[-1]
@@ -177,7 +177,7 @@ class Builder:
 
     def open(self, container: dict[str, Any] | list[Any], line: int) -> None:
         """Start a mapping or a list."""
-        location = self._here()
+        location = self._location()
         if len(location) >= MAX_DEPTH:
             raise MechanismFileError(TOO_DEEP, path=self.source.path, line=line)
         self._put(container, line)
@@ -204,7 +204,7 @@ class Builder:
         self._count += 1
         if self._count > MAX_VALUES:
             raise MechanismFileError(TOO_MANY.format(MAX_VALUES), path=self.source.path, line=line)
-        location = self._here()
+        location = self._location()
         self.source.lines.setdefault(location, line)
         if not self._stack:
             self.source.data = value

@@ -111,8 +111,8 @@ class SymPyModule(NumPyModule):
         if not shape:
             return [f"    out.append({texts[0]})"]
         rows, columns = shape if len(shape) == 2 else (shape[0], 1)
-        begun = "out.append(" if function.by_order else "out = ("
-        return [f"    {begun}sp.Matrix({rows}, {columns}, [", *wrapped(texts, indent=" " * 8), "    ]))"]
+        opening = "out.append(" if function.by_order else "out = ("
+        return [f"    {opening}sp.Matrix({rows}, {columns}, [", *wrapped(texts, indent=" " * 8), "    ]))"]
 
 
 def _symbols(names: Names, labels: Sequence[str]) -> str:

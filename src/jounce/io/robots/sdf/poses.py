@@ -32,7 +32,7 @@ class FramePose(NamedTuple):
         return FramePose(outer.rotation.T @ (self.position - outer.position), outer.rotation.T @ self.rotation)
 
 
-HERE = FramePose(np.zeros(3), np.eye(3))
+IDENTITY = FramePose(np.zeros(3), np.eye(3))
 
 
 class Frames:
@@ -48,7 +48,7 @@ class Frames:
 
     def __init__(self, model: Element, elements: dict[str, Element]):
         self.model, self.elements = model, elements
-        self._resolved: dict[str, FramePose] = {MODEL: HERE}
+        self._resolved: dict[str, FramePose] = {MODEL: IDENTITY}
 
     def pose(self, name: str) -> FramePose:
         """Return the pose of a frame in the model."""
@@ -124,7 +124,7 @@ def pose_of(element: Element, *name: str) -> FramePose:
 
     pose = element.first("pose")
     if pose is None or not pose.content.strip():
-        return HERE
+        return IDENTITY
     form = pose.attributes.get("rotation_format", "euler_rpy")
     if form == "quat_xyzw":
         numbers = pose.content_numbers(7, *name, "pose")

@@ -22,7 +22,7 @@ from jounce.io.robots.sdf.left_out import note_fluids, note_left_out
 from jounce.io.robots.sdf.links import gravity_of, read_inertia
 from jounce.io.robots.sdf.models import chosen_model
 from jounce.io.robots.sdf.poses import (
-    HERE,
+    IDENTITY,
     WORLD,
     FramePose,
     Frames,
@@ -143,7 +143,7 @@ class _Reader:
 
     def _link_pose(self, link: str) -> FramePose:
         """Return the pose of a link in the model."""
-        return HERE.seen_from(self.pose) if link == WORLD else self.frames.pose(link)
+        return IDENTITY.seen_from(self.pose) if link == WORLD else self.frames.pose(link)
 
     def _divided(
         self, joints: Sequence[SdfJoint], base: str, links: Sequence[str], fixed: bool
@@ -209,7 +209,7 @@ class _Reader:
         for part in self._parts(joint, intermediate, child.rotation, mimics):
             self.joints.append(dataclasses.replace(part, position=first.position, rotation=first.rotation))
             self.lines.add(joint.element, "joints", part.name)
-            first = HERE
+            first = IDENTITY
         if offset_origin:
             offset = child.seen_from(joint_frame).position
             self.joints.append(Joint(self._unused(f"{joint.child}_fixed"), intermediate, joint.child, "fixed", offset))

@@ -9,7 +9,7 @@ import numpy as np
 from jounce.errors import RobotError
 from jounce.io.robots.elements.faults import DEFAULT_DENSITY, OVERWRITTEN, Faults
 from jounce.io.robots.elements.xml_elements import Element
-from jounce.io.robots.sdf.poses import HERE, Frames, needed, number_of, pose_of
+from jounce.io.robots.sdf.poses import IDENTITY, Frames, needed, number_of, pose_of
 from jounce.rigid.inertia import Inertia
 
 DENSITY = 1000.0  # of water, kg/m^3
@@ -92,4 +92,4 @@ def _of_collision(name: str, collision: Element, inertial: Element, frames: Fram
     placement = pose_of(collision, *location)
     if relative not in ("", name):
         placement = frames.of(relative, pose or collision).seen_from(frames.pose(name)).then(placement)
-    return solid.moved(middle, HERE.rotation).moved(*placement)
+    return solid.moved(middle, IDENTITY.rotation).moved(*placement)

@@ -91,7 +91,7 @@ class StartingState:
 
     def __init__(self, mechanism: Mechanism, model: Model, instant: float):
         self.mechanism, self.model, self.instant = mechanism, model, instant
-        self.is_singular, self.here = False, None
+        self.is_singular, self.jacobian = False, None
         self.coordinates, self.assembly = self._assembled()
         self.freedom = self._counted()
         massive = any(body.mass is not None for body in mechanism.bodies.values())
@@ -102,9 +102,9 @@ class StartingState:
     def mobility(self) -> dict[str, Any] | None:
         """Return the mobility with drivers released; None if the mechanism cannot be assembled."""
         is_rolling = any(joint.nonholonomic for joint in self.mechanism.joints.values())  # motions depend on rates
-        if self.coordinates is None or self.here is None or is_rolling:
+        if self.coordinates is None or self.jacobian is None or is_rolling:
             return None
-        joints = self.here.take(np.array([name.startswith("joints.") for name in self.model.rows], bool))
+        joints = self.jacobian.take(np.array([name.startswith("joints.") for name in self.model.rows], bool))
         equations, columns = joints.shape
         are_independent = joints.rank == equations
         return _facts_of(independent(columns, equations) if are_independent else mobility(self.mechanism, self.instant))
@@ -133,7 +133,7 @@ class StartingState:
         pattern = model.system.pattern
         jacobian = HostJacobian.of(pattern, np.zeros(pattern.entry_count))
         if trial is not None and trial.jacobian.finite().all():
-            self.here, self.row_scale = trial.jacobian, model.system.row_scale
+            self.jacobian, self.row_scale = trial.jacobian, model.system.row_scale
             model, facts = redundancy_of(model, trial, self.instant)
             jacobian = facts.jacobian
             try:

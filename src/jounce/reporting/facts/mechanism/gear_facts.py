@@ -94,9 +94,9 @@ def train_facts(state: StartingState) -> list[dict[str, Any]]:
     >>> [(x["body"], x["driver"], x["fraction"]) for x in facts if x["body"] == "ring"]
     [('ring', 'sun_drive', '-2/5'), ('ring', 'carrier_drive', '7/5')]
     """
-    mechanism, model, here = state.mechanism, state.model, state.here
+    mechanism, model, jacobian = state.mechanism, state.model, state.jacobian
     meshing = _meshing(state)
-    if not meshing or here is None or not state.ok or state.freedom["left"]:
+    if not meshing or jacobian is None or not state.ok or state.freedom["left"]:
         return []
     turning = {name: driver for name, driver in mechanism.drivers.items() if is_turning(driver)}
     facts = []
@@ -105,7 +105,7 @@ def train_facts(state: StartingState) -> list[dict[str, Any]]:
         for name in turning:
             rhs = np.zeros(len(model.rows))
             rhs[model.rows.index(f"drivers.{name}")] = -1.0
-            step = here.step(rhs)
+            step = jacobian.step(rhs)
             if step is None:
                 continue
             turns = (step.reshape(-1, len(scale)) * scale)[:, model.pose_type.shifts :]
