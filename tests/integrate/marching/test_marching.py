@@ -1,5 +1,6 @@
 """How a run begins and goes on: one program of each kind."""
 
+import dataclasses
 from functools import partial
 
 import jax
@@ -128,3 +129,23 @@ def test_free_linkages_pass_their_change_points(linkage):
         exact = solve_ivp(rates, (0, 3), (angle, speed), "DOP853", time, rtol=1e-12, atol=1e-12).y[0]
         np.testing.assert_allclose(motion.outputs["angle"][:, 0], exact, rtol=0, atol=3e-7)
         assert np.ptp(motion.energy) < 1e-8
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_reactions_at_a_change_point_of_a_simulation_are_not_rounding(driven):
+    """A parallelogram whose coupler has its mass in a pin turns evenly without load on the other pin."""
+    linkage, _ = parallelogram()
+    turn = {"turn": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "1 + 2.5*t")}
+    coupler = dataclasses.replace(linkage.bodies["coupler"], center_of_mass=[0, 0])
+    parts = {"drivers": turn, "initial": {}} if driven else {"initial": turn}
+    mechanism = dataclasses.replace(linkage, gravity=None, bodies={**linkage.bodies, "coupler": coupler}, **parts)
+    flat = (np.pi - 1.0) / 2.5
+    offsets = np.array([0.0, *(sign * 10.0**-k for k in (12, 10, 8, 7, 6, 5, 4, 3) for sign in (-1, 1))])
+    motion = jn.simulate(mechanism, [0.0, 1.5], order=3).at(np.append(flat + offsets, 1.2))
+    forces = jn.joint_reaction(motion, "B").force.values  # (time, derivative, component)
+    assert np.isnan(forces[0]).all()
+    assert not np.isnan(forces[-1]).any()
+    assert not np.isnan(forces[np.abs(np.append(offsets, 1.0)) > 1e-5, 0]).any()
+    sizes = 0.5 * 0.1 * 2.5 ** np.arange(2.0, 2.0 + forces.shape[1])  # of the centripetal force of the coupler
+    assert (np.nanmax(np.abs(forces), axis=(0, 2)) < 2e-3 * sizes).all()
+    assert (motion.status == 0).all()

@@ -23,7 +23,7 @@ from jounce.errors import MechanismError
 from jounce.execution.mapped import Mapped, at_lanes
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.continuation.change_points import spoiled
+from jounce.kinematics.continuation.change_points import spoiled, spoiled_nearby
 from jounce.mechanism.building.element_indices import ElementIndex, element_indices
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import Group, law_left_out
@@ -90,9 +90,10 @@ class MotionForces:
         They are NaN at change points, where they are not determined, and next to them where rounding dominates.
         """
         multipliers = self._balancing[0][:, : len(self.model.rows)]
-        passages, time = self.motion.passages, self.motion.time
-        if passages:  # at a distance d from a change point, multipliers and their rounding grow as 1 / d
-            is_unknown = [spoiled(passages, time, level + 1) for level in range(len(multipliers))]
+        passages, time, distances = self.motion.passages, self.motion.time, self.motion.singular_distance
+        if passages or distances.min() < 1.0:  # at a distance d, multipliers and their rounding grow as 1 / d
+            orders = range(1, len(multipliers) + 1)
+            is_unknown = [spoiled(passages, time, order) | spoiled_nearby(distances, order) for order in orders]
             multipliers = np.where(np.array(is_unknown)[:, None], np.nan, multipliers)
         return multipliers
 

@@ -38,6 +38,8 @@ from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures
 MUCH_LONGER = 1e3
 FEW_INSTANTS = 8  # width of a program for a few instants, such as those at the end of a long run
 APPROACH = 4  # steps up to a jump or kink, each of which may be much shorter than the one before it
+SINGULAR = 1e3  # least response to a unit gap, in largest masses, beside a singular position
+RADIUS = 0.1  # response at about one radius of the series from a singular position; it grows with the inverse square
 
 
 class Simulation(Motion):
@@ -88,7 +90,9 @@ class Simulation(Motion):
 
         outputs, levels = start.model.system.outputs, {"order": derivatives_of_motion(mechanism, order)}
         outcome, backend = expanded.at_instants((start.equations, outputs), lanes_of, len(instants), **levels)
-        state, self._angles, outputs_found = outcome
+        state, self._angles, outputs_found, response = outcome
+        near = response > SINGULAR
+        self.singular_distance = np.where(near, np.sqrt(RADIUS / np.where(near, response, 1.0)), 1.0)
         groups = tuple(
             self._counted(group, series, instants) for group, series in zip(outputs, outputs_found, strict=True)
         )
@@ -296,7 +300,7 @@ def derivatives_of_motion(mechanism: Mechanism, order: int) -> int:
 @mapped(widths=(FEW_INSTANTS, *WIDTHS), narrow=True)
 def expanded(
     shared: tuple[Equations, tuple[Group, ...]], lanes: tuple[AnglesOfForces, State, Lanes, Lanes], order: int
-) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...]]:
+) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...], Lanes]:
     """Return the Taylor coefficients of the motion at instants, from the equations of motion.
 
     Next to a singular position, where rounding decides the coefficients of the equations, they are those of the step.
@@ -319,6 +323,8 @@ def expanded(
         Angles about axes that forces measure at the instants.
     outputs : tuple of array
         Series of the outputs, as from `output_series`.
+    response : array
+        Largest response to a unit gap of a constraint, in largest masses.
     """
     (equations, outputs), (angles, polynomial, step, instants) = shared, lanes
     equations = equations.near(angles)
@@ -332,7 +338,8 @@ def expanded(
             *(jnp.concatenate([x[:1], jnp.where(singular, y, x)[1:]]) for x, y in zip(series, step_series, strict=True))
         )
     outputs_found = output_series(outputs, pose_coordinates(series), equations.pose_type)
-    return series, revolution_counts.measured(counted, state), outputs_found
+    response = inverse.responses(counted.system.shape[1])[1]
+    return series, revolution_counts.measured(counted, state), outputs_found, response
 
 
 @mapped(widths=(FEW_INSTANTS, *WIDTHS))

@@ -47,6 +47,11 @@ def spoiled(
     return affected
 
 
+def spoiled_nearby(distances: Float[np.ndarray, " time"], order: int) -> Bool[np.ndarray, " time"]:
+    """Return whether rounding dominates derivatives of an order at distances from singular positions, in radii."""
+    return (distances < 1.0) & (ROUNDING * math.factorial(order) > LARGEST_NOISE * distances ** (order + 1))
+
+
 def bridged(
     solver: Solver, path: FollowedPath, point: ChangePoint, instants: Float[np.ndarray, " time"]
 ) -> tuple[dict[str, np.ndarray], tuple[np.ndarray, ...]] | None:

@@ -86,6 +86,7 @@ class Motion(Tabulated):
     """
 
     traced = False  # by JAX
+    singular_distance: Any = np.ones(1)  # at each instant, in radii of the series; 1 if it is large, or in `passages`
     check_idle: Callable[[dict[str, AbstractQuantity]], None] | None = None  # raises if outputs depend on idle motions
 
     def __init__(
