@@ -149,6 +149,7 @@ def test_other_instants_than_those_of_the_file(run, tmp_path):
         ("0:2:1.5", "count must be a whole number of instants, at least 2 unless"),
         ("2:0:3", "stop must not come before start (2 s), got '2:0:3'"),
         ("0:5 mm:3", "expected a time, such as 2 s, but the unit of '5 mm' is a length"),
+        ("0:AB:3", "expected a time, such as 2 s, but the parameter 'AB' is a length"),
         ("0:T:3", "unknown name 'T'"),
     ],
 )

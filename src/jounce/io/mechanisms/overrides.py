@@ -30,8 +30,10 @@ def times_chosen(mechanism: Mechanism, text: str) -> TimeGrid:
     if len(parts) != 3:
         raise MechanismError("must be START:STOP:COUNT, such as 0:2s:201", name="--times", value=text)
     try:
-        start, stop = (parse_value(part, "time", mechanism.parameters).value for part in parts[:2])
-        grid = TimeGrid(start, stop, count=parse_value(parts[2], "ratio", mechanism.parameters).value)
+        known = {name: allowed[0] for name, allowed in mechanism.dimensions.items() if len(allowed) == 1}
+        kinds = "time", "time", "ratio"
+        values = [parse_value(x, kind, mechanism.parameters, known).value for x, kind in zip(parts, kinds, strict=True)]
+        grid = TimeGrid(*values[:2], count=values[2])
         instants_of(grid, mechanism.parameter_values)
     except JounceError as error:
         raise type(error)(error.message, name="--times", value=text) from None
