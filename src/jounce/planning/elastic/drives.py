@@ -64,9 +64,10 @@ class Drive:
     velocity_limit: float | int | None = None
 
     def __post_init__(self) -> None:
-        for field in (entry.name for entry in dataclasses.fields(self)):
-            if getattr(self, field) is not None:
-                object.__setattr__(self, field, float(finite_numbers(field, getattr(self, field), ())))
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if value is not None or field.default is not None:
+                object.__setattr__(self, field.name, float(finite_numbers(field.name, value, ())))
         for field in POSITIVE:
             if getattr(self, field) is not None and getattr(self, field) <= 0:
                 raise RobotError("must be greater than zero", name=field, value=getattr(self, field))
