@@ -298,6 +298,21 @@ def test_limits_of_moveit(read):
     assert "default_velocity_scaling_factor: 0.1 do not count" in words
     alone = "/**:\n  ros__parameters:\n    robot_description_planning:\n      joint_limits: {pin: {max_effort: 7}}"
     assert read(alone)["pin"] == jn.Limits(velocity=3.0, effort=7.0)
+    assert read(alone.replace("/**", "/move_group"))["pin"] == jn.Limits(velocity=3.0, effort=7.0)
+
+
+@pytest.mark.parametrize("deceleration", [-5.0, 5, -5])
+def test_decelerations_of_pilz_are_below_zero_and_those_of_ros2_control_above(read, deceleration):
+    text = f"joint_limits: {{pin: {{has_deceleration_limits: true, max_deceleration: {deceleration}}}}}"
+    assert read(text)["pin"] == jn.Limits(velocity=3.0, effort=5.0, deceleration=5.0)
+
+
+def test_what_does_not_count_of_limits_of_moveit_is_named(read):
+    text = "cartesian_limits: {max_trans_vel: 1}\njoint_limits: {pin: {has_soft_limits: true, soft_upper_limit: 1}}"
+    with pytest.warns(jn.errors.RobotWarning) as caught:
+        assert read(text)["pin"] == jn.Limits(velocity=3.0, effort=5.0)
+    assert "cartesian_limits are left out" in str(caught[0].message)
+    assert str(caught[0].message).endswith("soft limits do not count: pin")
 
 
 @pytest.mark.parametrize(
@@ -309,6 +324,7 @@ def test_limits_of_moveit(read):
         ),
         ("joint_limits: {pin: {max_speed: 1}}", "line 1, joint_limits.pin.max_speed: unknown key"),
         ("joint_limits: {pin: {has_velocity_limits: 1}}", "line 1, joint_limits.pin.has_velocity_limits: must be true"),
+        ("joint_limits: {pin: {max_deceleration: true}}", "line 1, joint_limits.pin.max_deceleration: "),
         ("joint_limits: {pin: {max_velocity: 0}}", "line 1, joint_limits.pin.max_velocity: must be greater than zero"),
         ("joint_limits: {pin: {max_velocity: !deg 1}}", "line 1, joint_limits.pin.max_velocity: the YAML tag !deg is"),
         ("joints: {pin: {velocity: !degrees fast}}", "line 1, joints.pin.velocity: the YAML tag !degrees is not"),

@@ -9,7 +9,8 @@ from jounce.io.files.located_data import Location, Source, dotted
 from jounce.robot.robot import Robot
 
 WRAPPERS = ("/**", "ros__parameters", "robot_description_planning")
-"""Keys that may stand around ``joint_limits``, one within the other."""
+"""Keys that may stand around ``joint_limits``, one within the other, as may the name of a node."""
+CARTESIAN = "cartesian_limits"
 SCALES = ("default_velocity_scaling_factor", "default_acceleration_scaling_factor")
 LIMITS = {
     "lower": ("min_position", "has_position_limits"),
@@ -21,14 +22,16 @@ LIMITS = {
     "effort": ("max_effort", "has_effort_limits"),
 }
 """Each limit by our key: its key there, and the key of the flag that says whether it counts."""
-UNREAD = ("angle_wraparound", "has_soft_limits", "k_position", "k_velocity", "soft_lower_limit", "soft_upper_limit")
+SOFT = "has_soft_limits"
+UNREAD = ("angle_wraparound", SOFT, "k_position", "k_velocity", "soft_lower_limit", "soft_upper_limit")
 KEYS = {key for pair in LIMITS.values() for key in pair} | set(UNREAD)
 
 
 def moveit_limits(source: Source, robot: Robot) -> dict[str, dict[str, tuple[Any, Location]]] | None:
     """Return limits of joints by our keys, each as written and where; None if the file is not of this kind.
 
-    A flag that is false takes a limit away, also that of the robot; without a flag a value counts.
+    A flag that is false takes a limit away, also that of the robot; without a flag a value counts. Decelerations may
+    have either sign: the Pilz planner of MoveIt wants them below zero, ros2_control above.
 
     Raises
     ------
@@ -37,11 +40,12 @@ def moveit_limits(source: Source, robot: Robot) -> dict[str, dict[str, tuple[Any
     """
     base: Location = ()
     data = source.data
-    while isinstance(data, dict) and len(data) == 1 and (key := next(iter(data))) in WRAPPERS:
+    while isinstance(data, dict) and len(data) == 1 and _is_wrapper(*next(iter(data.items()))):
+        key = next(iter(data))
         base, data = (*base, key), data[key]
     if not isinstance(data, dict) or "joint_limits" not in data:
         return None
-    source.mapping(base, ("joint_limits", *SCALES))
+    source.mapping(base, ("joint_limits", *SCALES, CARTESIAN))
     base = (*base, "joint_limits")
     joints = source.mapping(base)
     unknown = [name for name in joints if name not in robot.joint_names]
@@ -51,9 +55,18 @@ def moveit_limits(source: Source, robot: Robot) -> dict[str, dict[str, tuple[Any
     scales = [f"{key}: {data[key]}" for key in SCALES if data.get(key, 1) != 1]
     if scales:
         notes.append(f"{', '.join(scales)} do not count, as limits are those of joint_limits")
+    if CARTESIAN in data:
+        notes.append(f"{CARTESIAN} are left out: limits of the speed of a tool are `points` of a limits file of jounce")
+    if soft := [name for name in joints if name not in unknown and source.mapping((*base, name)).get(SOFT) is True]:
+        notes.append(f"soft limits do not count: {', '.join(soft)}")
     if notes:
         warn_caller(RobotWarning(f"{source.path}, line {source.line(base)}, {dotted(base)}: {'; '.join(notes)}"))
     return {name: _of(source, (*base, name)) for name in joints if name not in unknown}
+
+
+def _is_wrapper(key: Any, entry: Any) -> bool:
+    """Return whether a key stands around limits: one of `WRAPPERS`, or a node with its parameters."""
+    return key in WRAPPERS or (isinstance(entry, dict) and list(entry) == ["ros__parameters"])
 
 
 def _of(source: Source, location: Location) -> dict[str, tuple[Any, Location]]:
@@ -65,5 +78,7 @@ def _of(source: Source, location: Location) -> dict[str, tuple[Any, Location]]:
         if not counts and flag in entry:
             limits[key] = (None, (*location, flag))
         elif value in entry:
-            limits[key] = (entry[value], (*location, value))
+            number = entry[value]
+            signed = key == "deceleration" and isinstance(number, int | float) and not isinstance(number, bool)
+            limits[key] = (abs(number) if signed else number, (*location, value))
     return limits
