@@ -274,6 +274,10 @@ MULTI = {"header": HEADER, "joint_names": [], "points": []}
             "trajectory": [{"joint_trajectory": message(POINTS), "multi_dof_joint_trajectory": MULTI}],
             "trajectory_start": {"joint_state": {"name": ["elbow", "shoulder"], "position": [0.0, 0.0]}},
         },
+        {"trajectory": {"joint_trajectory": message(POINTS), "multi_dof_joint_trajectory": MULTI}},
+        {"goal": {"trajectory": {"joint_trajectory": message(POINTS)}, "controller_names": []}},
+        {"planned_trajectory": {"joint_trajectory": message(POINTS)}, "planning_time": 0.1},
+        {"motion_plan_response": {"group_name": "arm", "trajectory": {"joint_trajectory": message(POINTS)}}},
         {
             "model_id": "arm",
             "trajectory": [{"joint_trajectory": message(POINTS[:6])}, {"joint_trajectory": message(POINTS[5:])}],
@@ -351,11 +355,23 @@ def test_between_a_point_without_accelerations_and_another_the_law_is_a_cubic(tm
 
 def test_a_robot_that_is_not_where_its_trajectory_starts(tmp_path):
     start = {"joint_state": {"name": list(JOINTS), "position": [0.0, 0.2]}}
-    data = {"model_id": "arm", "trajectory": [{"joint_trajectory": message(POINTS)}], "trajectory_start": start}
+    moves = {"joint_trajectory": message(POINTS)}
+    planned = {"trajectory": moves, "trajectory_start": start}
     path = tmp_path / "message.json"
-    path.write_text(json.dumps(data))
-    with pytest.raises(TrajectoryError, match=r"robot starts at 0\.2, and the trajectory of elbow at 0: it would jump"):
+    for data in ({"model_id": "arm", **planned, "trajectory": [moves]}, {"motion_plan_response": planned}):
+        path.write_text(json.dumps(data))
+        with pytest.raises(TrajectoryError, match=r"starts at 0\.2, and the trajectory of elbow at 0: it would jump"):
+            jn.load_trajectory(path)
+
+
+def test_the_line_of_a_point_that_no_controller_takes(tmp_path):
+    path = tmp_path / "message.yaml"
+    path.write_text(plain_yaml(message([point(0), point(1, velocities=[]), point(2)])))
+    lines = path.read_text().splitlines()
+    second = [k for k, line in enumerate(lines, 1) if line.startswith("- accelerations")][1]
+    with pytest.raises(TrajectoryError, match="accelerations without velocities") as raised:
         jn.load_trajectory(path)
+    assert raised.value.line == second
 
 
 def test_as_the_controller_goes(tmp_path):

@@ -55,11 +55,11 @@ def load_trajectory(
     ``initial`` is then a list for each joint, and ``time`` may be omitted.
 
     Files for controllers (`export_trajectory`) are recognized by their content: tables with the columns ``q_d_0`` or
-    ``target_q_0``, and ROS messages: JointTrajectory, FollowJointTrajectory goals, RobotTrajectory and
-    DisplayTrajectory of MoveIt, as YAML (also as printed by ``ros2 topic echo``) or JSON. Polynomials go through their
-    positions, with velocities and accelerations if given. Joint states, echoed or in a bag (.bag, .db3, .mcap, or the
-    folder of a bag; needs rosbags), are samples, as are the positions in dynamic joint states, and the measured values
-    in the states of joint_trajectory_controller.
+    ``target_q_0``, and ROS messages: JointTrajectory, FollowJointTrajectory goals, RobotTrajectory, DisplayTrajectory,
+    plans and goals of ExecuteTrajectory of MoveIt, as YAML (also as printed by ``ros2 topic echo``) or JSON.
+    Polynomials go through their positions, with velocities and accelerations if given. Joint states, echoed or in a bag
+    (.bag, .db3, .mcap, or the folder of a bag; needs rosbags), are samples, as are the positions in dynamic joint
+    states, and the measured values in the states of joint_trajectory_controller.
 
     Parameters
     ----------

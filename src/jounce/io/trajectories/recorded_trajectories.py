@@ -78,7 +78,8 @@ def trajectory_of(
         times = recording.times[inside]
         return JointTrajectory(laws, start, stop, times, dict(recording.measures))
     except JounceError as error:
-        raise TrajectoryError(error.message, path=recording.path, name=error.name, value=error.value) from None
+        place = {"path": recording.path, "line": error.line, "name": error.name}
+        raise TrajectoryError(error.message, value=error.value, **place) from None
 
 
 def _as_points(recording: Recording, joint: int) -> AbstractMotion:

@@ -24,8 +24,11 @@ SEVERAL = ("multi_dof_joint_trajectory", "multi_dof_trajectory")
 """Where RobotTrajectory and goals of controllers hold the motion of planar and floating joints."""
 START = 1e-6  # rad or m, largest distance of the robot from the start of a trajectory
 _POINT = {*LEVELS, "effort", "time_from_start"}
-_INSIDE: tuple[tuple[str, ...], ...] = ((), ("trajectory",), ("joint_trajectory",), ("goal", "trajectory"))
-"""Locations of a JointTrajectory: itself, FollowJointTrajectory goals, RobotTrajectory, action goals."""
+_OF_GOALS: tuple[tuple[str, ...], ...] = ((), ("trajectory",), ("goal", "trajectory"))
+_OF_ROBOTS: tuple[tuple[str, ...], ...] = (*_OF_GOALS, ("planned_trajectory",), ("motion_plan_response", "trajectory"))
+_INSIDE = (*_OF_GOALS, *((*keys, "joint_trajectory") for keys in _OF_ROBOTS))
+"""Locations of a JointTrajectory: itself, in goals of controllers, and in a RobotTrajectory, goals and plans of MoveIt.
+"""
 
 
 def is_message(data: Any) -> bool:
@@ -50,8 +53,9 @@ def _is_trajectory(data: Any) -> bool:
 def read_messages(source: Source, joints: Sequence[str] | None = None) -> Recording:
     """Return the recording of a ROS message, or of a list of joint states; `joints` replace the names in it.
 
-    The message is a JointTrajectory, a FollowJointTrajectory goal, a RobotTrajectory or DisplayTrajectory of MoveIt, a
-    JointState, a DynamicJointState, or a JointTrajectoryControllerState, whose measured values are read.
+    The message is a JointTrajectory, a FollowJointTrajectory goal, a RobotTrajectory, DisplayTrajectory, plan or goal
+    of ExecuteTrajectory of MoveIt, a JointState, a DynamicJointState, or a JointTrajectoryControllerState, whose
+    measured values are read.
 
     Raises
     ------
@@ -78,7 +82,8 @@ def _trajectories(source: Source) -> Recording:
     displayed = source.data.get("trajectory")
     if not isinstance(displayed, list):
         keys = next(keys for keys in _INSIDE if _is_trajectory(_inside(source.data, keys)))
-        return _without_base(source, keys[:-1], _points(source, keys))
+        recording = _without_base(source, keys[:-1], _points(source, keys))
+        return _started(source, recording, keys[:-2])
     if not displayed:
         raise source.error("holds no trajectory", ("trajectory",))
     locations: list[Location] = [("trajectory", k, "joint_trajectory") for k in range(len(displayed))]
@@ -120,9 +125,9 @@ def _joined(source: Source, place: Location, first: Recording, second: Recording
     return Recording(first.path, first.names, times, values, lines, points=True)
 
 
-def _started(source: Source, recording: Recording) -> Recording:
+def _started(source: Source, recording: Recording, place: Location = ()) -> Recording:
     """Raise an error if a message states that the robot does not start where its trajectory does."""
-    location: Location = ("trajectory_start", "joint_state")
+    location: Location = (*place, "trajectory_start", "joint_state")
     state = _at(source, location)
     if not is_joint_state(state) or len(state["name"]) != len(state["position"]):
         return recording
