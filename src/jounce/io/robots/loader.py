@@ -55,7 +55,8 @@ def load_robot(
     strict : bool, default False
         Whether to raise errors instead of warnings.
     model : str, optional
-        Name of the model in an SDF file with several; required unless only one of them moves.
+        Name of the model in an SDF file with several; required unless only one of them moves, or joints connect those
+        that do.
     closures
         File with loops, springs and rotors that the robot file lacks; see `with_closures`.
     allow

@@ -129,6 +129,51 @@ def test_joints_of_a_world_join_models(tmp_path):
         read(tmp_path, world(arm(), joint("hinge", "tabel::top", "arm::base")))
 
 
+def test_models_that_joints_of_a_world_connect_are_one_robot(tmp_path):
+    """None has to be chosen; a model that is not connected counts only if it moves, too."""
+    box, hinge = f'<model name="box">{link("cube")}</model>', joint("hinge", "a", "b")
+    bodies = [f'<model name="{name}">{link("body")}</model>' for name in "ab"]
+    robot = read(tmp_path, world(box, *bodies, hinge))
+    assert (robot.name, robot.joint_names, robot.base) == ("a", ("hinge",), "a::body")
+    assert set(robot.links) == {"a::body", "b::body"}
+    assert read(tmp_path, world(arm("a"), arm("b"), hinge)).joint_names == ("a::j", "hinge", "b::j")
+    with pytest.raises(jn.errors.RobotFileError, match="holds 3 models that move"):
+        read(tmp_path, world(arm("a"), arm("b"), arm("c"), hinge))
+
+
+@pytest.mark.parametrize("attached", ["", ' attached_to="world"', ' attached_to="base::body"'])
+def test_joints_of_a_world_are_at_its_frames(tmp_path, attached):
+    """The child turns about the y axis of the frame: F R_y(q) F^-1 times its pose, seen from the parent."""
+    poses = {"base": "0.3 0 0.1 0.2 0 0", "f": "1 -0.5 0.2 0.4 -0.3 0.2", "arm": "0.5 0 0.2 0.1 0.2 0.3"}
+    base, frame, body = (matrix(pose) for pose in poses.values())
+    parts = [f'<model name="{name}"><pose>{poses[name]}</pose>{link("body")}</model>' for name in ("base", "arm")]
+    parts.append(f'<frame name="f"{attached}><pose>{poses["f"]}</pose></frame>')
+    axis = '<axis><xyz expressed_in="f">0 1 0</xyz></axis>'
+    ends = "<parent>f</parent><child>arm::body</child>"
+    parts.append(f'<joint name="hinge" type="revolute"><pose relative_to="f"/>{ends}{axis}</joint>')
+    robot = read(tmp_path, world(*parts), model="arm")
+    at_base = attached.endswith('body"')
+    frame, root = (base @ frame, base) if at_base else (frame, np.eye(4))
+    assert (robot.base, robot.joint_names) == ("base::body" if at_base else "world", ("hinge",))
+    motion = jn.forward_kinematics(robot, [[0.7]], "arm::body")
+    turned = np.linalg.inv(root) @ frame @ matrix("0 0 0 0 0.7 0") @ np.linalg.inv(frame) @ body
+    np.testing.assert_allclose(motion.position[0], turned[:3, 3], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(motion.rotation[0], turned[:3, :3], rtol=0, atol=1e-14)
+
+
+def matrix(pose):
+    numbers = [float(x) for x in pose.split()]
+    found = np.eye(4)
+    found[:3, :3], found[:3, 3] = Rotation.from_euler("xyz", numbers[3:]).as_matrix(), numbers[:3]
+    return found
+
+
+def test_a_joint_does_not_move_the_world(tmp_path):
+    fixed = '<frame name="f"/>' + joint("hinge", "arm::base", "f")
+    with pytest.raises(jn.errors.RobotFileError, match=r"no link, joint or frame has this name, got 'world'"):
+        read(tmp_path, world(arm(), fixed))
+
+
 def test_links_out_of_gravity_weigh_nothing(tmp_path):
     parts = link("base") + link("rod", "0.5 0 0 0 0 0", "<gravity>false</gravity>") + link("tip", "1 0 0 0 0 0")
     parts += joint("w", "world", "base", kind="fixed") + joint("j", "base", "rod") + joint("k", "rod", "tip")

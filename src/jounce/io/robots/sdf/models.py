@@ -14,15 +14,14 @@ from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from jounce.errors import RobotFileError, no_such
 from jounce.io.files.reading import named_file
 from jounce.io.robots.elements.faults import RENAMED, Faults
 from jounce.io.robots.elements.xml_elements import Element, read_markup
 from jounce.io.robots.sdf.joints import with_named_axes
-from jounce.io.robots.sdf.poses import MODEL, WORLD, FramePose, Frames, check_known, flag_of
+from jounce.io.robots.sdf.poses import IDENTITY, MODEL, WORLD, FramePose, Frames, check_known, flag_of
 from jounce.io.robots.sdf.scopes import made, named, placed, reference_pose, scope, scoped
+from jounce.io.robots.sdf.worlds import WorldJoints
 
 MODEL_PARTS = ("static", "self_collide", "allow_auto_disable", "enable_wind", "pose", "link", "joint", "frame")
 MODEL_PARTS += ("plugin", "gripper", "include", "model")
@@ -95,13 +94,12 @@ def chosen_model(
         raise RobotFileError(no_such("model", name, given), path=root.path, name="model", value=name)
     label = _only_one(given, reader) if name is None else name
     model, its_version, world = given[label]
-    joints = [] if world is None else world.every("joint")
-    if any(label in _models_of(joint) for joint in joints):
-        return ChosenModel(_joined(label, given, joints, reader), FramePose(np.zeros(3), np.eye(3)), world, NEWEST)
+    joints = WorldJoints(world)
+    if joints.of([label]):
+        return ChosenModel(_joined(label, given, joints, reader), IDENTITY, world, NEWEST)
     flat = reader.flattened(model, its_version, top=True)
     if reference_pose(flat)[1]:  # relative to another model, or to a frame of the world
-        frames = [] if world is None else world.every("frame")
-        result = dataclasses.replace(model, attributes={"name": WORLD}, children=[*frames])
+        result = dataclasses.replace(model, attributes={"name": WORLD}, children=[*joints.frames.values()])
         for other, item in given.items():
             if item.world is world:
                 result.children += scope(other, reader.flattened(item.model, item.version, top=True))
@@ -130,11 +128,16 @@ class _SourceModel(NamedTuple):
 
 
 def _only_one(given: dict[str, _SourceModel], reader: _Models) -> str:
-    """Return the name of the only model, or of the only one that moves or is not static."""
+    """Return the only model, the only one that moves or is not static, or the first of several that are connected."""
+    if len(given) == 1:
+        return next(iter(given))
     movable = [name for name, item in given.items() if not _static(item.model)]
-    moving = [name for name in movable if _moves(given[name], reader)] if len(given) > 1 else []
-    for names in (list(given), moving, movable if not moving else []):
-        if len(names) == 1:
+    worlds = {id(item.world): item.world for item in given.values()}
+    joints = {key: WorldJoints(world) for key, world in worlds.items()}
+    moved = {(key, name) for key, x in joints.items() for joint in _not_fixed(x.joints) for name in x.models(joint)}
+    moving = [x for x in movable if (id(given[x].world), x) in moved or _moves(given[x], reader)]
+    for names in (moving, movable if not moving else []):
+        if names and joints[id(given[names[0]].world)].connected(names[0], given).issuperset(names):
             return names[0]
     candidates = moving or movable or list(given)
     phrase = "that move" if moving else "and none that moves"
@@ -150,30 +153,23 @@ def _static(model: Element) -> bool:
 
 def _moves(given: _SourceModel, reader: _Models) -> bool:
     """Return whether a model has moving joints, of its own or of nested models."""
-    if any(part.tag == "joint" and part.attributes.get("type") not in ("fixed", None) for part in given.model.walk()):
+    if _not_fixed(part for part in given.model.walk() if part.tag == "joint"):
         return True
     if not any(part.tag == "include" for part in given.model.walk()):
         return False
     flat = reader.flattened(given.model, given.version, top=True)
-    return any(joint.attributes.get("type") != "fixed" for joint in flat.every("joint"))
+    return bool(_not_fixed(flat.every("joint")))
 
 
-def _models_of(joint: Element) -> set[str]:
-    """Return the names of the models that a joint of the world connects."""
-    return {part.content.strip().partition("::")[0] for tag in ("parent", "child") for part in joint.every(tag)}
+def _not_fixed(joints: Iterable[Element]) -> list[Element]:
+    return [joint for joint in joints if joint.attributes.get("type") not in ("fixed", None)]
 
 
-def _joined(label: str, given: dict[str, _SourceModel], joints: list[Element], reader: _Models) -> Element:
+def _joined(label: str, given: dict[str, _SourceModel], joints: WorldJoints, reader: _Models) -> Element:
     """Return the models that joints of the world connect as one model; static ones are fixed to the world."""
-    members, before = {label}, 0
-    while len(members) != before:
-        before = len(members)
-        for joint in joints:
-            if (ends := _models_of(joint) - {WORLD}) & members:
-                for end in ends - given.keys():
-                    raise joint.error(no_such("model of this world", end, given), "joints", value=end)
-                members |= ends
-    root = dataclasses.replace(given[label].model, attributes={"name": label}, children=[])
+    members = joints.connected(label, given)
+    children = [*joints.frames.values()]
+    root = dataclasses.replace(given[label].model, attributes={"name": label}, children=children)
     for name in (name for name in given if name in members):
         model = reader.flattened(given[name].model, given[name].version, top=True)
         root.children += scope(name, model)
@@ -182,7 +178,7 @@ def _joined(label: str, given: dict[str, _SourceModel], joints: list[Element], r
             fixed = [made(model, tag, text) for tag, text in ends.items()]
             attributes = {"name": f"{name}::{WORLD}_fixed", "type": "fixed"}
             root.children.append(dataclasses.replace(model, tag="joint", attributes=attributes, children=fixed))
-    root.children += [joint for joint in joints if _models_of(joint) & members]
+    root.children += joints.of(members)
     return root
 
 
