@@ -1,5 +1,6 @@
 """Forces and laws that a long step would pass over: pulses in time and in place, kinks, jumps, what has no value."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -191,3 +192,25 @@ def test_a_run_ends_where_a_law_jumps_that_has_a_value_there(law):
     assert [jn.Status(s).name for s in run.status] == ["OK", "OK", "COLLAPSED"]
     assert run.ended_at == pytest.approx(0.77, abs=1e-9)
     assert run.faults == {2: "drivers.x at t = 0.77 s"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
+def test_a_spring_turns_around_at_its_anchor(gap):
+    """The force of a spring reverses within a time of `gap` over the speed, which few points along a step may miss."""
+    sprung = dataclasses.replace(
+        sled(at=-2.0, rate=10.0), forces={"spring": forces.Spring(("ground", "sled"), [0, gap], [0, 0], 2.0, 1.5)}
+    )
+    motion = jn.simulate(sprung, [0.0, 0.1, 0.3, 0.4], 1)
+    x, v = motion.outputs["x"][:, :2, 0].T
+    np.testing.assert_allclose(v**2 + 2.0 * (np.hypot(x, gap) - 1.5) ** 2, 100.0 + 2.0 * (np.hypot(2, gap) - 1.5) ** 2)
+    assert x[0] < x[1] < 0 < x[2] < x[3]
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-6])
+def test_a_pulse_whose_denominator_nears_zero(width):
+    pushed = dataclasses.replace(
+        sled(), forces={"push": forces.PointForce("sled", [0, 0], [f"{width}/({width}**2 + (t - 0.3)**2)", 0.0])}
+    )
+    velocity = jn.simulate(pushed, [0.0, 1.0], 1).outputs["x"][-1, 1, 0]
+    assert velocity == pytest.approx(math.atan(0.7 / width) + math.atan(0.3 / width), rel=0, abs=1e-10)

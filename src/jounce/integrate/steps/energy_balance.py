@@ -75,13 +75,15 @@ def is_balanced(equations: Equations, state: State, time: Instants) -> bool:
     """Return whether the energy balance of a mechanism is checked.
 
     It is checked if no law of time moves the mechanism, all forces state their stored energy, and the series could
-    overlook a joint. The check costs less than a tenth of a step.
+    overlook a joint or loops could change their assembly at a singular position. The check costs less than a tenth of a
+    step.
     """
     at_rest, pose = equations.pose_at_rest(state.position, state.attitude), equations.pose(state)
     groups, forces = equations.system.groups, equations.system.forces
+    has_loops = sum(group.instances for group in groups) > state.position.shape[-2]  # more joints than bodies
     if (
         any(map(has_friction, groups))
-        or not constraints_to_watch(equations, state, time)
+        or not (has_loops or constraints_to_watch(equations, state, time))
         or any(_is_moved(group, at_rest, time) for group in groups)
     ):
         return False

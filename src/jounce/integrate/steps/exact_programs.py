@@ -1,19 +1,27 @@
 """Programs that a Taylor series cannot overlook: sums, products, sines and cosines, of low degree.
 
 The first Taylor coefficients determine a polynomial of low degree anywhere, and the waves of a sine. Those of a bell, a
-step or a table say nothing about its values elsewhere.
+step or a table say nothing about its values elsewhere. Roots and quotients, as in the force of a spring, are determined
+as long as radicands and denominators stay away from zero (`radicands_and_denominators`).
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
-from jax.extend.core import ClosedJaxpr, Literal
+import jax
+from jax.extend.core import ClosedJaxpr, JaxprEqn, Literal
 
 from jounce.jet.programs.operations import ADDITIVE, REARRANGING
-from jounce.jet.programs.reader import inner_program
+from jounce.jet.programs.reader import ProgramReader, inner_program
 
 MAX_DEGREE = 8  # in the arguments: a power such as x**40 is flat, and then a wall
-SUMS = (ADDITIVE | REARRANGING | frozenset(["neg", "optimization_barrier"])) - {"select_n", "gather", "dynamic_slice"}
+MAX_DEGREE_OF_FORCES = 2 * MAX_DEGREE  # moments of damped springs in space have 14; forces are compared at points, too
+SELECTORS = {
+    "select_n": slice(1),
+    "gather": slice(1, None),
+    "dynamic_slice": slice(1, None),
+}  # and their choosing operands
+SUMS = (ADDITIVE | REARRANGING | frozenset(["neg", "optimization_barrier"])) - SELECTORS.keys()
 WAVES = frozenset(["sin", "cos"])
 PRODUCTS = frozenset(["mul", "dot_general"])
 
@@ -65,7 +73,7 @@ def _degrees(jaxpr: Any, arguments: Sequence[int]) -> list[int] | None:
 def _made(equation: Any, degrees: list[int]) -> list[int] | None:
     """Return the degrees of the results of an operation, or None if there is no degree."""
     name, inner = equation.primitive.name, inner_program(equation.params)
-    if name in SUMS:
+    if name in SUMS or (name in SELECTORS and not any(degrees[SELECTORS[name]])):
         return [max(degrees)] * len(equation.outvars)
     if name in PRODUCTS:
         return [sum(degrees)]
@@ -80,3 +88,60 @@ def _made(equation: Any, degrees: list[int]) -> list[int] | None:
     if inner is not None and name not in ("while", "scan", "cond"):
         return _degrees(getattr(inner, "jaxpr", inner), degrees)
     return None
+
+
+def radicands_and_denominators(function: Callable[..., Any], *arguments: Any) -> list[Any] | None:
+    """Return the radicands and denominators in a function that is otherwise as of `is_plain`, or None.
+
+    Where these stay away from zero, the results are analytic functions, which leave no pulse between few points.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> radicands_and_denominators(lambda x: x / jnp.sqrt(1.0 + x * x), jnp.array(2.0))
+    [Array(5., dtype=float64), Array(2.23606798, dtype=float64)]
+    >>> radicands_and_denominators(lambda x: jnp.exp(-x * x), jnp.array(2.0)) is None
+    True
+    """
+    program, reader = jax.make_jaxpr(function)(*arguments), _DegreeReader([])
+    leaves = [_Graded(leaf, 1) for leaf in jax.tree.leaves(arguments)]
+    try:
+        reader.read(program.jaxpr, program.consts, leaves)
+    except _NoDegreeError:
+        return None
+    return reader.divisors
+
+
+class _Graded(NamedTuple):
+    array: Any
+    degree: int
+
+
+class _NoDegreeError(Exception):
+    """An operation has no degree in its operands, or one that is too high."""
+
+
+class _DegreeReader(ProgramReader):
+    """Interpreter of programs that carries degrees along and collects radicands and denominators."""
+
+    moving = _Graded
+
+    def __init__(self, divisors: list[Any]):
+        self.divisors = divisors
+
+    def value(self, x: Any) -> Any:
+        return x.array if isinstance(x, _Graded) else x
+
+    def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
+        degrees = [x.degree if isinstance(x, _Graded) else 0 for x in operands]
+        name, arrays = equation.primitive.name, [self.value(x) for x in operands]
+        if name == "sqrt" or (name == "div" and degrees[1]):
+            self.divisors.append(arrays[-1])
+            degrees_out: list[int] | None = [sum(degrees)]
+        else:
+            degrees_out = _made(equation, degrees)
+        if degrees_out is None or max(degrees_out) > MAX_DEGREE_OF_FORCES:
+            raise _NoDegreeError
+        results = equation.primitive.bind(*arrays, **equation.params)
+        results = results if equation.primitive.multiple_results else [results]
+        return [_Graded(array, degree) for array, degree in zip(results, degrees_out, strict=True)]

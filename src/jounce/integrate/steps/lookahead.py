@@ -4,7 +4,8 @@ A pulse that lies ahead in time or space leaves no trace in a Taylor series, and
 it. Forces and laws are therefore evaluated along the polynomial of the step at many instants, and compared with their
 interpolation from a few nodes, which is accurate to rounding for a function that is analytic over the step. If they
 differ, and the difference would move the mechanism, the step is halved. The same applies if the residual of a joint
-does not vanish along the step, for joints that a series could overlook (`is_plain`).
+does not vanish along the step, for joints that a series could overlook (`is_plain`). Few instants do for forces such as
+those of springs, whose only singularities are zeros of radicands and denominators, over steps without such a zero.
 """
 
 from typing import Any, NamedTuple
@@ -18,7 +19,7 @@ from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Flags, Indices, Instants, Inverse, Lanes, State
 from jounce.dynamics.forward.ground import with_ground
 from jounce.integrate.steps.events import INTERPOLATION, NODES
-from jounce.integrate.steps.exact_programs import is_plain
+from jounce.integrate.steps.exact_programs import is_plain, radicands_and_denominators
 from jounce.integrate.steps.methods import MARGIN, Number, evaluated
 from jounce.integrate.steps.revolution_counts import Angles
 from jounce.jet import Jet
@@ -33,6 +34,7 @@ POINTS = 32  # of a step that are evaluated
 ROUNDS_OF_JOINTS = 4  # factor on their number if joints are watched
 RUN_POINTS = 8192  # least number of points in the whole run, if there are few steps
 HARMLESS = 1e-15  # displacement of a body that may be overlooked, rad or sizes of the mechanism
+ELLIPSE = 1.1  # parameter (sum of semi-axes) of the Bernstein ellipse around a step that has to be free of zeros
 SHAKE = 2.0**-51  # relative change of state and time that measures the rounding error of a force
 SPARSE = 7  # every so many nodes are changed, in both directions, as a jump beside a node shows in one only
 _SHAKEN = (np.tile(NODES[::SPARSE], 2), np.repeat([SHAKE, -SHAKE], len(NODES[::SPARSE])))
@@ -248,6 +250,7 @@ class _Signals:
             coefficients = jnp.where(is_followed, coefficients, 0.0)
         fewest = ROUNDS_OF_JOINTS if self._joints else 1
         rounds_needed = jnp.max(jnp.where(duration > 0, jnp.abs(step) / duration, 0.0)) * (RUN_POINTS / POINTS)
+        rounds_needed = jnp.where(self._is_analytic(step), 0.0, rounds_needed)
         rounds = jnp.clip(jnp.ceil(rounds_needed), fewest, RUN_POINTS // POINTS)
         count = rounds * POINTS
         size = jnp.max(jnp.abs(knots), axis=0)
@@ -265,6 +268,25 @@ class _Signals:
         largest, total = jax.lax.fori_loop(0, rounds.astype(int), look, (jnp.zeros_like(size), jnp.zeros_like(size)))
         largest, mean = jnp.max(largest, axis=0), jnp.max(total, axis=0) / count
         return largest, self._moved(largest, mean * jnp.abs(step * duration)[None], mobility)
+
+    def _is_analytic(self, step: Lanes) -> Any:
+        """Return whether forces, laws and joints are analytic in an ellipse around the step: such hide no pulse.
+
+        They are if they have no operations but those of `radicands_and_denominators`, and if these have no zero there:
+        the constant in their Chebyshev series then exceeds the sum of all other terms at any point of the ellipse.
+        """
+
+        def divisors(elapsed: Any) -> Any:
+            return radicands_and_denominators(lambda *given: self._parts(*given), *self._state(elapsed, 0.0))
+
+        if jax.eval_shape(divisors, step) is None:
+            return False
+        is_nonzero = [jnp.ones((), bool)]
+        for values in jax.vmap(lambda s: divisors(s * step))(NODES):
+            series = jnp.abs(jnp.sum(INTERPOLATION[:, :, None] * values.reshape(1, len(NODES), -1), axis=1))
+            largest = ELLIPSE ** np.arange(1, len(series))  # of the Chebyshev polynomials in the ellipse
+            is_nonzero.append(jnp.all(series[0] > jnp.sum(largest[:, None] * series[1:], axis=0)))
+        return jnp.all(jnp.stack(is_nonzero))
 
     def _moved(self, largest: Signals, impulse: Signals, mobility: BodyMobility) -> Signals:
         """Return the displacements of bodies by departures of forces, from their impulses in N s^2, and of laws."""
@@ -285,24 +307,31 @@ class _Signals:
 
         With `shake`, time and all coordinates have relative changes of this size, with different signs.
         """
-        lanes = elapsed.shape[-1]
-        clock = Jet.variable(((self._time + elapsed) * (1.0 + shake))[None], 1)
-        parts: list[Any] = []
-        pose: Any = None
-        if self._forces or self._joints:
-            state = evaluated(self._path, elapsed).map(lambda part: part * (1.0 + shake * _signs(part.shape[:2])))
-            pose = self._equations.pose(state)
-        if self._forces:
-            forces = with_turns(self._forces, self._angles.at(elapsed))
-            parts += [group.force(pose, clock).coefficients[0] for group in forces]
-        for group in self._drivers:
-            law = group.element.motion(clock).coefficients[0]
-            parts.append(jnp.broadcast_to(law, (group.instances, lanes))[None])
-        for group, scale in self._joints:
-            parts.append(group.residual(pose.truncate(0), clock.truncate(0)).coefficients[0] * scale)
+        parts = self._parts(*self._state(elapsed, shake))
         row_count = max(len(part) for part in parts)
         padded = [jnp.pad(part, ((0, row_count - len(part)), (0, 0), (0, 0))) for part in parts]
-        return jnp.concatenate([jnp.broadcast_to(p, (*p.shape[:2], lanes)) for p in padded], axis=1)
+        return jnp.concatenate([jnp.broadcast_to(p, (*p.shape[:2], elapsed.shape[-1])) for p in padded], axis=1)
+
+    def _state(self, elapsed: Lanes, shake: Any) -> tuple[Lanes, State | None, Any]:
+        """Return the instant, the state of the bodies that forces and joints act on, and the angles they measure."""
+        time = (self._time + elapsed) * (1.0 + shake)
+        if not (self._forces or self._joints):
+            return time, None, None
+        state = evaluated(self._path, elapsed).map(lambda part: part * (1.0 + shake * _signs(part.shape[:2])))
+        return time, state, self._angles.at(elapsed)
+
+    def _parts(self, time: Lanes, state: State | None, turns: Any) -> list[Any]:
+        """Return the watched values, (components, instances, batch) of each group."""
+        clock, parts = Jet.variable(time[None], 1), []
+        pose: Any = None if state is None else self._equations.pose(state)
+        if self._forces:
+            parts += [group.force(pose, clock).coefficients[0] for group in with_turns(self._forces, turns)]
+        for group in self._drivers:
+            law = group.element.motion(clock).coefficients[0]
+            parts.append(jnp.broadcast_to(law, (group.instances, time.shape[-1]))[None])
+        for group, scale in self._joints:
+            parts.append(group.residual(pose.truncate(0), clock.truncate(0)).coefficients[0] * scale)
+        return parts
 
 
 def _combined(
