@@ -233,5 +233,5 @@ def outputs_of_runs(
         As for `expanded`.
     """
     (values,), (design, motion) = shared, lanes
-    *_, series = expanded.function(of_design(values, design), motion, order)
+    _, _, series, _ = expanded.function(of_design(values, design), motion, order)
     return series

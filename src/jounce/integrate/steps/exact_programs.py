@@ -15,12 +15,8 @@ from jounce.jet.programs.operations import ADDITIVE, REARRANGING
 from jounce.jet.programs.reader import ProgramReader, inner_program
 
 MAX_DEGREE = 8  # in the arguments: a power such as x**40 is flat, and then a wall
-MAX_DEGREE_OF_FORCES = 2 * MAX_DEGREE  # moments of damped springs in space have 14; forces are compared at points, too
-SELECTORS = {
-    "select_n": slice(1),
-    "gather": slice(1, None),
-    "dynamic_slice": slice(1, None),
-}  # and their choosing operands
+MAX_DEGREE_OF_FORCES = 2 * MAX_DEGREE  # springs in space have 9; forces are compared at points, too
+SELECTORS = {"select_n": slice(1), "gather": slice(1, None), "dynamic_slice": slice(1, None)}  # with what selects
 SUMS = (ADDITIVE | REARRANGING | frozenset(["neg", "optimization_barrier"])) - SELECTORS.keys()
 WAVES = frozenset(["sin", "cos"])
 PRODUCTS = frozenset(["mul", "dot_general"])
