@@ -399,3 +399,15 @@ def test_a_cam_in_space_repeats_its_law_from_turn_to_turn(tmp_path):
     exact = expected(law, instants)[0]
     sizes = np.abs(exact).max(axis=0)
     np.testing.assert_allclose(found / sizes, exact / sizes, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("grid", [[0, 90, 180, 270, 360], [45, 90], [90, 100], [180], [720, 810, 900]])
+def test_corners_of_a_cam_on_the_grid_are_those_of_the_segment_that_begins(grid):
+    """A modified sine begins with the jerk 16 pi^3 h / (4 + pi) / T^3: the rate of the force on a follower of 1 kg."""
+    camshaft = jn.load("examples/camshaft.yaml")
+    speed, degrees = camshaft.parameter_values["speed"], np.array(grid)
+    jerk = 16 * np.pi**3 / (4 + np.pi) * 0.015 * (speed / (np.pi / 2)) ** 3
+    motion = jn.solve(camshaft, np.deg2rad(degrees) / speed, order=3)
+    corners = degrees % 90 == 0
+    expected = np.select([degrees % 360 == 0, degrees % 360 == 180], [jerk, -jerk], 0.0)
+    np.testing.assert_allclose(motion.outputs["contact"][corners, 1], expected[corners], rtol=1e-9, atol=1e-6)

@@ -206,9 +206,9 @@ class SplineMotion(AbstractMotion):
         first, stop = jnp.asarray(self.breakpoints)[0], jnp.asarray(self.stop)
         return continued(self._within, time, first, stop, self.beyond, self.advance)
 
-    def _within(self, time: Jet) -> Jet:
+    def _within(self, time: Jet, choosing: Any) -> Jet:
         """Return the jet of the polynomials at given instants; outside, those at the ends are extrapolated."""
-        start, powers = self._chosen(time.coefficients[0], jnp.asarray(self.coefficients))
+        start, powers = self._chosen(choosing, jnp.asarray(self.coefficients))
         local = time - start
         value = Jet.constant(powers[-1], time.order)
         for c in powers[-2::-1]:

@@ -131,3 +131,12 @@ def test_samples_of_a_derivative_that_repeat_must_close():
         jn.laws.MeasuredMotion(t, np.ones(21), derivative=2, beyond="advance")
     with pytest.raises(jn.errors.MechanismError, match="must end at the value they begin with"):
         jn.laws.MeasuredMotion(t, 2 * np.pi * t, derivative=1, beyond="repeat")
+
+
+@pytest.mark.parametrize("beyond", ["repeat", "hold"])
+def test_a_law_that_is_undefined_before_its_piece_begins_is_not_evaluated_there(beyond):
+    """0.7 lies by rounding before 0.1 + 0.6, 2.1 before three times 0.7: sqrt(0) and its value count, no NaN."""
+    law = jn.laws.PiecewiseMotion(["sqrt(t)", "sqrt(0.7 - t)"], until=[0.35, 0.1 + 0.6], beyond=beyond)
+    lasting = jn.laws.PiecewiseMotion(["1 - t", "sqrt(t - (0.1 + 0.2)) + 0.7"], until=[0.1 + 0.2])
+    assert lasting(jn.Jet([np.array([0.3, 0.3 - 1e-15])])).coefficients[0].tolist() == [0.7, 1 - (0.3 - 1e-15)]
+    assert np.isfinite(derivatives(law, 0.7 * np.arange(1, 40) * (1 - 2.0**-53), 0)).all()

@@ -19,6 +19,7 @@ PEAKS = {
     "modified_sine": (1.760, 5.528, 69.47),
     "trapezoidal": (1.75, 6.125, 42.875),
 }
+JUST_BEFORE = 1.0 - 8 * np.finfo(float).eps  # an instant nearer than half of that is at its end
 SMOOTH = {"harmonic": 1, "polynomial_4_5_6_7": 3}
 
 
@@ -67,9 +68,26 @@ def test_derivatives_are_those_of_the_law_and_repeat():
     assert law.smoothness == 1
 
 
+@pytest.mark.parametrize("beyond, turns", [("hold", 0), ("repeat", 0), ("repeat", 1), ("repeat", 41), ("advance", 7)])
+def test_instants_that_decimals_put_beside_a_border_have_the_derivatives_of_the_segment_that_begins(beyond, turns):
+    """0.1 + 0.2 is above 0.3, and 0.7 below what ends there: the half wave that begins has -+ (pi / T)^2 h / 2."""
+    segments = [Segment("harmonic", 0.1, to=0.1), Segment("harmonic", 0.2, to=0.3), Segment("dwell", 0.4)]
+    last = Segment("harmonic", 0.1, to=0.2 if beyond == "advance" else 0.0)
+    law = SegmentedMotion([*segments, last], beyond=beyond)
+    borders, expected = np.array([0.1, 0.3, 0.7, 0.8]), [0.2, 0.0, last.to - 0.3, 0.1 if beyond != "hold" else 0.0]
+    expected = np.array(expected) / 2 * (math.pi / np.array([0.2, 1.0, 0.1, 0.1])) ** 2
+    for offset in (-1, 0, 1):
+        instants = 0.8 * turns + borders
+        instants += offset * np.spacing(instants)
+        found = derivatives(law, instants, 2)
+        np.testing.assert_allclose(found[2], expected, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(found[1], 0.0, rtol=0, atol=1e-11)
+    assert np.abs(derivatives(law, [0.3 * JUST_BEFORE], 2)[2] + (math.pi / 0.2) ** 2 / 10) < 1e-9
+
+
 def test_a_polynomial_meets_what_it_is_given_at_both_ends():
     law = SegmentedMotion([Segment("polynomial", 0.7, to=2.0, begin=[1.0, -2.0, 3.0], end=[0.5, 4.0])], initial=-1.0)
-    pieces = derivatives(law, [0.0, np.nextafter(0.7, 0)], 3)
+    pieces = derivatives(law, [0.0, 0.7 * JUST_BEFORE], 3)
     np.testing.assert_allclose(pieces[:, 0], [-1.0, 1.0, -2.0, 3.0], rtol=1e-12)
     np.testing.assert_allclose(pieces[:3, 1], [2.0, 0.5, 4.0], rtol=1e-11)
 
@@ -78,7 +96,7 @@ def test_a_polynomial_begins_with_the_acceleration_that_the_one_before_was_free_
     """3.5 t^3 - 2.5 t^4 comes to 1 with the velocity 0.5, and with the acceleration 21 - 30."""
     first = Segment("polynomial", 1.0, to=1.0, begin=[0.0, 0.0], end=[0.5])
     law = SegmentedMotion([first, Segment("polynomial", 0.5, to=2.0), Segment("dwell", 1.0)])
-    before, after = derivatives(law, [np.nextafter(1.0, 0), 1.0], 2).T
+    before, after = derivatives(law, [JUST_BEFORE, 1.0], 2).T
     np.testing.assert_allclose(after, [1.0, 0.5, -9.0], rtol=1e-12)
     np.testing.assert_allclose(before, after, rtol=1e-12)
     assert law.smoothness == 2

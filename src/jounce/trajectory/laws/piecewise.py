@@ -12,7 +12,7 @@ from jounce.base.modules import field
 from jounce.base.shapes import is_traced
 from jounce.errors import MechanismError, TrajectoryError, check_choice
 from jounce.jet import Jet
-from jounce.trajectory.beyond import CLOSED, check_within, continued
+from jounce.trajectory.beyond import CLOSED, check_within, continued, not_before
 from jounce.trajectory.knots import SMOOTH, derivative_sizes
 from jounce.trajectory.laws.composed import CompositeLaw, Law
 from jounce.trajectory.laws.segment_pieces import Value, number_or_expression, parsed_value
@@ -147,15 +147,16 @@ class PiecewiseMotion(CompositeLaw):
         stop = self.until[-1] if self.beyond != "continue" else None
         return continued(self._within, time, self.start, stop, mode, 0.0 if self.advance is None else self.advance)
 
-    def _within(self, time: Jet) -> Jet:
+    def _within(self, time: Jet, choosing: Any) -> Jet:
         instants = time.coefficients[0]
         begins, ends = self._borders()
         value: tuple[Any, ...] = ()
         for law, start, end in zip(self.parts, begins, ends, strict=True):
-            is_own = (instants >= start) & (instants < end)
+            is_own = (choosing >= start) & (choosing < end)
             # outside its piece, a law may be undefined: it is evaluated at an instant of the piece
             inner = jnp.clip(instants, start, jnp.where(jnp.isinf(start), end, start))
-            coefficients = law(Jet((jnp.where(is_own, instants, inner), *time.coefficients[1:]))).dense().coefficients
+            own = jnp.where(is_own, not_before(start, instants), inner)
+            coefficients = law(Jet((own, *time.coefficients[1:]))).dense().coefficients
             value = tuple(jnp.where(is_own, f, v) for f, v in zip(coefficients, value or coefficients, strict=True))
         return Jet(value)
 

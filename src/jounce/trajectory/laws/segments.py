@@ -161,10 +161,10 @@ class SegmentedMotion(SplineMotion):
             raise TrajectoryError(message, name="segments", value=self._open)
         return super().__call__(time)
 
-    def _within(self, time: Jet) -> Jet:
+    def _within(self, time: Jet, choosing: Any) -> Jet:
         """Return the jet of the polynomials and the sines at given instants."""
-        start, (amplitude, frequency, phase) = self._chosen(time.coefficients[0], jnp.asarray(self.sines))
-        return super()._within(time) + sin((time - start) * frequency + phase) * amplitude
+        start, (amplitude, frequency, phase) = self._chosen(choosing, jnp.asarray(self.sines))
+        return super()._within(time, choosing) + sin((time - start) * frequency + phase) * amplitude
 
     def jumps(self, order: int = 4) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "{order}+1 knots"]]:
         """Return the jumps of derivatives where segments meet, and at the ends.
