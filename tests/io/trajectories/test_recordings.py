@@ -338,6 +338,9 @@ def test_joint_states_as_they_are_echoed(tmp_path, stamp):
         ([point(0), point(0, positions=[1.0, 2.0])], "must come after that of the point before, which is another"),
         ([point(0.5), point(0)], r"points\[1\]\.time_from_start: must come after"),
         ([point(0), "..."], "points: was cut"),
+        ([point(0), point(1, positions=[10**400, 0])], r"points\[1\]\.positions: must be 2 finite numbers"),
+        ([point(0), point(1, time_from_start=10**400)], r"points\[1\]\.time_from_start: must be a time"),
+        ([point(0), point(1, time_from_start={"sec": 10**400})], r"time_from_start\.sec: must be a whole number"),
     ],
 )
 def test_points_that_no_controller_takes(tmp_path, points, words):
@@ -345,6 +348,12 @@ def test_points_that_no_controller_takes(tmp_path, points, words):
     path.write_text(json.dumps(message(points)))
     with pytest.raises(TrajectoryError, match=words):
         jn.load_trajectory(path)
+
+
+def test_positions_may_be_whole_numbers_of_any_size(tmp_path):
+    path = tmp_path / "message.json"
+    path.write_text(json.dumps(message([point(0), point(1, positions=[10**20, 1])])))
+    assert jn.load_trajectory(path).derivatives([1.0], 0)[0, 0].tolist() == [1e20, 1.0]
 
 
 def test_between_a_point_without_accelerations_and_another_the_law_is_a_cubic(tmp_path):

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
 
-import numpy as np
-
 from jounce.io.files.located_data import Location, Source
 
 NANO = 1_000_000_000
+LARGEST = 2**63
 CUT = "..."
 """Text that ``ros2 topic echo`` prints in place of omitted entries."""
 
@@ -35,10 +35,21 @@ def check_whole(source: Source, location: Location, given: Any) -> None:
 def joint_row(source: Source, location: Location, given: Any, count: int, unknown: bool = False) -> list[float]:
     """Return a number for each joint; NaN, of what is not measured, only where some may be unknown."""
     check_whole(source, location, given)
-    numbers = isinstance(given, list) and all(isinstance(x, int | float) and not isinstance(x, bool) for x in given)
-    if not numbers or len(given) != count or not (np.isfinite(given) | (unknown & np.isnan(given))).all():
+    numbers = [number_of(x) for x in given] if isinstance(given, list) else []
+    valid = [x for x in numbers if x is not None and (math.isfinite(x) or (unknown and math.isnan(x)))]
+    if not isinstance(given, list) or not len(valid) == len(given) == count:
         raise source.error(f"must be {count} finite numbers, one for each joint: {location[-1]}", location, value=given)
-    return [float(x) for x in given]
+    return valid
+
+
+def number_of(given: Any) -> float | None:
+    """Return a number, infinite if it is too large for a float; None for anything else."""
+    if isinstance(given, bool) or not isinstance(given, int | float):
+        return None
+    try:
+        return float(given)
+    except OverflowError:
+        return math.inf
 
 
 def seconds_of(source: Source, location: Location, given: Any) -> float:
@@ -48,8 +59,9 @@ def seconds_of(source: Source, location: Location, given: Any) -> float:
             "is missing: the time of each point since the start, as {sec: 1, nanosec: 0} or as a number of seconds"
         )
         raise source.error(message, location)
-    if isinstance(given, int | float) and not isinstance(given, bool) and np.isfinite(given) and given >= 0:
-        return float(given)
+    number = number_of(given)
+    if number is not None and math.isfinite(number) and number >= 0:
+        return number
     return float(stamp_of(source, location, given))
 
 
@@ -60,6 +72,6 @@ def stamp_of(source: Source, location: Location, given: Any) -> Decimal:
         raise source.error("must be a time, as {sec: 1, nanosec: 0}", location, value=given)
     values = [given.get(part, 0) for part in parts]
     for part, value in zip(parts, values, strict=True):
-        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            raise source.error("must be a whole number, 0 or greater", (*location, part), value=value)
+        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < LARGEST:
+            raise source.error("must be a whole number, 0 or greater, of 64 bits", (*location, part), value=value)
     return Decimal(values[0]) + Decimal(values[1]) / NANO

@@ -10,7 +10,7 @@ import numpy as np
 
 from jounce.io.files.located_data import Location, Source
 from jounce.io.trajectories.recordings import LEVELS, Recording
-from jounce.io.trajectories.ros.fields import check_whole, joint_names, joint_row, seconds_of
+from jounce.io.trajectories.ros.fields import check_whole, joint_names, joint_row, number_of, seconds_of
 from jounce.io.trajectories.ros.states import (
     SEVERAL_COORDINATES,
     is_joint_state,
@@ -133,9 +133,10 @@ def _started(source: Source, recording: Recording, place: Location = ()) -> Reco
         return recording
     where = dict(zip(state["name"], state["position"], strict=True))
     for k, name in enumerate(recording.names):
-        if isinstance(where.get(name), int | float) and abs(where[name] - recording.values[0, 0, k]) > START:
+        position = number_of(where.get(name))
+        if position is not None and abs(position - recording.values[0, 0, k]) > START:
             message = (
-                f"the robot starts at {where[name]:.9g}, and the trajectory of {name} at "
+                f"the robot starts at {position:.9g}, and the trajectory of {name} at "
                 f"{recording.values[0, 0, k]:.9g}: it would jump"
             )
             raise source.error(message, (*location, "position"))
