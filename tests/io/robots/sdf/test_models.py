@@ -161,6 +161,21 @@ def test_joints_of_a_world_are_at_its_frames(tmp_path, attached):
     np.testing.assert_allclose(motion.rotation[0], turned[:3, :3], rtol=0, atol=1e-14)
 
 
+@pytest.mark.parametrize("reference", ["far", "far::body"])
+def test_joined_models_may_be_placed_by_one_that_is_not_joined(tmp_path, reference):
+    far, near = "1 -0.5 0.2 0.4 -0.3 0.2", "0.5 0 0.2 0.1 0.2 0.3"
+    models = [f'<model name="far"><pose>{far}</pose>{link("body")}</model>', f'<model name="a">{link("body")}</model>']
+    models.append(f'<model name="b"><pose relative_to="{reference}">{near}</pose>{link("body")}</model>')
+    robot = read(tmp_path, world(*models, joint("hinge", "a", "b")))
+    assert robot.links.keys() == {"a::body", "b::body"}
+    motion = jn.forward_kinematics(robot, [[0.0]], "b::body")
+    expected = matrix(far) @ matrix(near)
+    np.testing.assert_allclose(motion.position[0], expected[:3, 3], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(motion.rotation[0], expected[:3, :3], rtol=0, atol=1e-14)
+    with pytest.raises(jn.errors.RobotFileError, match="no link, joint or frame has this name, got 'else'"):
+        read(tmp_path, world(*models, joint("hinge", "a", "b")).replace(f'to="{reference}"', 'to="else"'))
+
+
 def matrix(pose):
     numbers = [float(x) for x in pose.split()]
     found = np.eye(4)

@@ -20,7 +20,7 @@ from jounce.io.robots.elements.faults import RENAMED, Faults
 from jounce.io.robots.elements.xml_elements import Element, read_markup
 from jounce.io.robots.sdf.joints import with_named_axes
 from jounce.io.robots.sdf.poses import IDENTITY, MODEL, WORLD, FramePose, Frames, check_known, flag_of
-from jounce.io.robots.sdf.scopes import made, named, placed, reference_pose, scope, scoped
+from jounce.io.robots.sdf.scopes import REFERENCES, made, named, placed, reference_pose, scope, scoped, with_pose
 from jounce.io.robots.sdf.worlds import WorldJoints
 
 MODEL_PARTS = ("static", "self_collide", "allow_auto_disable", "enable_wind", "pose", "link", "joint", "frame")
@@ -99,11 +99,7 @@ def chosen_model(
         return ChosenModel(_joined(label, given, joints, reader), IDENTITY, world, NEWEST)
     flat = reader.flattened(model, its_version, top=True)
     if reference_pose(flat)[1]:  # relative to another model, or to a frame of the world
-        result = dataclasses.replace(model, attributes={"name": WORLD}, children=[*joints.frames.values()])
-        for other, item in given.items():
-            if item.world is world:
-                result.children += scope(other, reader.flattened(item.model, item.version, top=True))
-        pose = Frames(result, named(result)).of(f"{label}::{MODEL}", model, "pose")
+        pose = _frames_of_world(label, given, joints, reader).of(f"{label}::{MODEL}", model, "pose")
         return ChosenModel(flat, pose, world, NEWEST)
     return ChosenModel(flat, placed(flat), world, NEWEST)
 
@@ -179,7 +175,23 @@ def _joined(label: str, given: dict[str, _SourceModel], joints: WorldJoints, rea
             attributes = {"name": f"{name}::{WORLD}_fixed", "type": "fixed"}
             root.children.append(dataclasses.replace(model, tag="joint", attributes=attributes, children=fixed))
     root.children += joints.of(members)
+    own = {part.attributes.get("name") for part in root.children}
+    named_frames = {x.attributes.get(key, MODEL) for part in root.children for x in part.walk() for key in REFERENCES}
+    if foreign := {name for name in named_frames - {MODEL} if not own & {name, f"{name}::{MODEL}"}}:
+        frames = _frames_of_world(label, given, joints, reader)
+        known = sorted(foreign & (frames.elements.keys() | given.keys()))
+        root.children += [with_pose(made(root, "frame", name=x), frames.of(x, root)) for x in known]
     return root
+
+
+def _frames_of_world(label: str, given: dict[str, _SourceModel], joints: WorldJoints, reader: _Models) -> Frames:
+    """Return the frames of the world that contains a model, with those of all its models."""
+    model, _, world = given[label]
+    whole = dataclasses.replace(model, attributes={"name": WORLD}, children=[*joints.frames.values()])
+    for name, item in given.items():
+        if item.world is world:
+            whole.children += scope(name, reader.flattened(item.model, item.version, top=True))
+    return Frames(whole, named(whole))
 
 
 class _Models:

@@ -62,12 +62,21 @@ def made(like: Element, tag: str, text: str = "", **attributes: str) -> Element:
     return Element(tag, attributes, like.path, like.line, pieces=[text], faults=like.faults)
 
 
+def with_pose(element: Element, pose: FramePose, relative: str = MODEL) -> Element:
+    """Return a new element after it was given its pose relative to a frame."""
+    from scipy.spatial.transform import Rotation
+
+    numbers = [*pose.position, *Rotation.from_matrix(pose.rotation).as_quat()]
+    child = made(element, "pose", " ".join(map(repr, map(float, numbers))), relative_to=relative)
+    child.attributes["rotation_format"] = "quat_xyzw"
+    element.children.append(child)
+    return element
+
+
 def scoped(
     model: Element, scope: str, placed: tuple[FramePose, str], location: Element, *, merged: bool = False
 ) -> list[Element]:
     """Return the parts of a model with their names in the containing model, and the frame of the model."""
-    from scipy.spatial.transform import Rotation
-
     frame = f"_merged__{scope}__model__" if merged else f"{scope}::{MODEL}"
 
     def rename(name: str) -> str:
@@ -77,12 +86,8 @@ def scoped(
 
     pose, relative = placed
     canonical = Frames(model, named(model)).canonical_link()
-    numbers = [*pose.position, *Rotation.from_matrix(pose.rotation).as_quat()]
-    pose_element = made(location, "pose", " ".join(map(repr, map(float, numbers))), relative_to=relative or MODEL)
-    pose_element.attributes["rotation_format"] = "quat_xyzw"
     attached = made(location, "frame", name=frame, attached_to=rename(canonical))
-    attached.children.append(pose_element)
-    parts = [attached]
+    parts = [with_pose(attached, pose, relative or MODEL)]
     for child in model.children:
         if child.tag in ("pose", "static", "self_collide", "allow_auto_disable", "enable_wind"):
             continue
