@@ -20,8 +20,9 @@ class HermiteMotion(SplineMotion):
     """A motion law through instants with given values and derivatives.
 
     Between instants it is a polynomial with all derivatives of the instant before, and the first five of the instant
-    after. An instant that is given twice has the derivatives of the first row from the left and those of the second
-    from the right; `jumps` returns the differences.
+    after. At the last instant, derivatives above the given ones are those of the polynomial that ends there, unless the
+    law continues beyond. An instant that is given twice has the derivatives of the first row from the left and those of
+    the second from the right; `jumps` returns the differences.
 
     Parameters
     ----------
@@ -68,6 +69,9 @@ class HermiteMotion(SplineMotion):
             raise TrajectoryError("must increase", name="times", value=instants.tolist()[:5])
         begins = np.append(~is_double, True)  # at a repeated instant, the second row begins a piece
         pieces = hermite_pieces(instants, table) if is_given.all() else _mixed_pieces(instants, table, is_given)
+        if beyond != "continue" and len(instants) > 1:
+            given = int(is_given[-1].sum())
+            pieces[given:, -1] = _at_end(pieces[:, -2], instants[-1] - instants[-2])[given:]
         self._set(instants[begins], pieces[:, begins], instants[-1], beyond)
 
     def jumps(self, order: int = 4) -> Jumps:
@@ -110,6 +114,12 @@ def _mixed_pieces(
     final = derivatives[-1, : is_given[-1].sum()][:top]
     result[: len(final), -1] = final / np.array([math.factorial(k) for k in range(len(final))], float)
     return result
+
+
+def _at_end(powers: Float[np.ndarray, " powers"], length: float) -> Float[np.ndarray, " powers"]:
+    """Return the powers of a piece about its end."""
+    orders = np.arange(len(powers))
+    return _binomials(len(powers), orders) @ (powers * length**orders) / length**orders
 
 
 def _binomials(orders: int, powers: np.ndarray) -> Float[np.ndarray, "orders powers"]:
