@@ -63,4 +63,4 @@ def test_smoothing_takes_some_arrays_of_the_length_of_the_log():
         return found
 
     peak(12_000)  # imports
-    assert peak(360_000) / (8 * 360_000) < 13
+    assert peak(360_000) / (8 * 360_000) < 14  # 13.0, of which the choice of pieces takes one
