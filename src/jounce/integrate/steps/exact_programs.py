@@ -94,8 +94,8 @@ def radicands_and_denominators(function: Callable[..., Any], *arguments: Any) ->
     Examples
     --------
     >>> import jax.numpy as jnp
-    >>> radicands_and_denominators(lambda x: x / jnp.sqrt(1.0 + x * x), jnp.array(2.0))
-    [Array(5., dtype=float64), Array(2.23606798, dtype=float64)]
+    >>> [float(x) for x in radicands_and_denominators(lambda x: x / jnp.sqrt(x * x), jnp.array(2.0))]
+    [4.0, 2.0]
     >>> radicands_and_denominators(lambda x: jnp.exp(-x * x), jnp.array(2.0)) is None
     True
     """

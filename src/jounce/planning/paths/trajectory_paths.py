@@ -19,6 +19,7 @@ from jounce.errors import SampleWarning, TrajectoryError
 from jounce.planning.paths.path import Path
 from jounce.planning.pieces import JoinedPieces
 from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory, SplineMotion
+from jounce.trajectory.beyond import ROUNDING
 
 REST_SPEED = 1e-3  # fraction of the largest speed: a trajectory slower than this at its ends rests at them
 RESTING = 1e-5  # fraction of the largest speed: a trajectory slower than this between its ends rests
@@ -34,7 +35,7 @@ BEND = 2e-3  # rad: smaller changes of direction at a stop do not count
 BACK = 0.05  # rad: changes of direction this near to half a turn are reversals
 WIDEST = 0.1  # fraction of the length: reach of a power on each side of a stop
 CLOSE = 0.125  # fraction of the reach within which a separate piece keeps rounding small
-ROUNDING = 4 * float(np.finfo(float).eps)  # fraction of the length
+SHORTENED = 4 * ROUNDING  # fraction of the length: more than what counts as rounding where laws choose a piece
 FLAT = 4  # continuous derivatives where a power joins the length
 DEGREE = 5
 TURNING = 1e-2  # fraction of the largest acceleration: with more at a rest, the trajectory reverses smoothly
@@ -93,8 +94,8 @@ class Ramps:
     def motion(self, total: float) -> JoinedPieces:
         """Return the length over the parameter, up to a total length.
 
-        Next to a stop, the length changes by less than its rounding. Before the center, it is reduced by slightly more
-        than that, so that a law with a corner at this length turns exactly at the center, where the motion rests.
+        Next to a stop, the length changes by less than its rounding. Before the center, it is reduced by more than
+        that, so that a law with a corner at this length turns exactly at the center, where the motion rests.
         """
         begins, polynomials = [0.0], [np.polynomial.Polynomial([0.0, 1.0])]
         for stop, center, reach, width in zip(self.stops, self.centers, self.reach, self.widths, strict=True):
@@ -103,7 +104,7 @@ class Ramps:
                 for x in ([1.0, -1.0 / reach], [CLOSE, -1.0 / reach], [0.0, 1.0 / reach])
             )
             begins += [center - reach, center - CLOSE * reach, center, center + reach]
-            polynomials += [stop - reach * ramp_down, stop * (1 - ROUNDING) - reach * close, stop + reach * ramp_up]
+            polynomials += [stop - reach * ramp_down, stop * (1 - SHORTENED) - reach * close, stop + reach * ramp_up]
             polynomials.append(np.polynomial.Polynomial([stop + width, 1.0]))
         height = max(len(p.coef) for p in polynomials)
         powers = np.stack([np.pad(p.coef, (0, height - len(p.coef))) for p in polynomials], axis=1)
