@@ -22,7 +22,7 @@ from jounce.integrate.steps.energy_balance import energies
 from jounce.integrate.steps.events import WIDTHS, in_pieces, pose_coordinates, series_of
 from jounce.integrate.steps.lookahead import watched_names
 from jounce.integrate.steps.methods import evaluated, expanded_about, near_singular
-from jounce.integrate.steps.projection import projected
+from jounce.integrate.steps.projection import normalized, projected
 from jounce.integrate.steps.revolution_counts import POINTS_IN_STEP, AnglesOfForces
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
@@ -38,6 +38,8 @@ from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures
 MUCH_LONGER = 1e3
 FEW_INSTANTS = 8  # width of a program for a few instants, such as those at the end of a long run
 APPROACH = 4  # steps up to a jump or kink, each of which may be much shorter than the one before it
+STRAYED = 1e-9  # correction of positions beyond which the projection may have left them, rad or sizes of the mechanism
+AMPLIFIED = 1e3  # largest plausible ratio of a correction to the gap that it closes
 SINGULAR = 1e3  # least response to a unit gap, in largest masses, beside a singular position
 RADIUS = 0.1  # response at about one radius of the series from a singular position; it grows with the inverse square
 
@@ -303,7 +305,8 @@ def expanded(
 ) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...], Lanes]:
     """Return the Taylor coefficients of the motion at instants, from the equations of motion.
 
-    Next to a singular position, where rounding decides the coefficients of the equations, they are those of the step.
+    Next to a singular position, where rounding decides the coefficients of the equations, they are those of the step;
+    so are positions and velocities where the projection onto the constraints would leave them.
 
     Parameters
     ----------
@@ -330,15 +333,22 @@ def expanded(
     equations = equations.near(angles)
     first_angles = revolution_counts.measured(equations, polynomial.map(lambda part: part[0]))
     counted = equations.near(revolution_counts.followed(equations, first_angles, polynomial, step).at(step))
-    state, _, inverse = projected(counted, evaluated(polynomial, step), instants[None])
+    arrived = evaluated(polynomial, step)
+    state, correction, inverse = projected(counted, arrived, instants[None])
+    residual = counted.system.residual(counted.pose_at_rest(arrived.position, arrived.attitude), Jet([instants[None]]))
+    gap = jnp.max(jnp.abs(residual.coefficients[0]), axis=0, initial=0.0)
+    is_lost = ~(correction <= jnp.maximum(STRAYED, AMPLIFIED * gap))  # by a projection at a singular position
+    state = State(*(jnp.where(is_lost, x, y) for x, y in zip(arrived, state, strict=True)))
+    state = state._replace(attitude=normalized(state.attitude))
     series = expand(counted, state, instants[None], order, inverse).state
     if len(polynomial.position) > order:  # steps of another solver have fewer coefficients
-        singular, step_series = near_singular(counted, inverse), expanded_about(polynomial, step, order)
+        singular = near_singular(counted, inverse) | is_lost
+        step_series = expanded_about(polynomial, step, order)
         series = State(
             *(jnp.concatenate([x[:1], jnp.where(singular, y, x)[1:]]) for x, y in zip(series, step_series, strict=True))
         )
     outputs_found = output_series(outputs, pose_coordinates(series), equations.pose_type)
-    response = inverse.responses(counted.system.shape[1])[1]
+    response = jnp.where(is_lost, jnp.inf, inverse.responses(counted.system.shape[1])[1])
     return series, revolution_counts.measured(counted, state), outputs_found, response
 
 
