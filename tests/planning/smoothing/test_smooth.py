@@ -132,11 +132,8 @@ def test_the_jerk_is_that_of_the_motion(name, noise, rate):
     assert motion.stop == times[-1]
 
 
-@pytest.mark.parametrize("periods", [10, 20, 40, 80])
-@pytest.mark.parametrize("count", [501, 2501])
+@pytest.mark.parametrize("count, periods", [(501, 10), (501, 20), *((2501, periods) for periods in (10, 20, 40, 80))])
 def test_many_periods_are_no_noise(count, periods):
-    if count < 25 * periods:
-        pytest.skip("too few samples for a jerk")
     times, rate = np.linspace(0.0, 5.0, count), 2 * np.pi * periods / 5
     values = 0.5 * np.sin(rate * times + 1) + 2e-5 * np.random.default_rng(periods).normal(size=count)
     _, law, found = law_of(times, values, 2e-4)
