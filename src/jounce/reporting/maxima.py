@@ -82,8 +82,8 @@ class RunningMaxima:
 
     def _rounded(self, heights: Curves) -> Curves:
         """Return heights to multiples of their rounding, so that maxima of one height are equal."""
-        step = ROUNDING * self.scales
-        return np.where(step > 0, np.rint(heights / np.where(step > 0, step, 1.0)) * step, heights)
+        step = ROUNDING * np.where(self.scales > 0, self.scales, 1.0)
+        return np.rint(heights / step) * step
 
 
 def alike(first: Curves, second: Curves) -> bool:
