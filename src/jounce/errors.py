@@ -326,7 +326,7 @@ class SampleWarning(_BoundedWarning):
 
 
 class RecordingWarning(_BoundedWarning):
-    """A recording was changed when read: rows were sorted, merged or left out, or time stamps shifted."""
+    """Samples have gaps, or were changed when read: rows sorted, merged or left out, or time stamps shifted."""
 
 
 class UnitWarning(_BoundedWarning):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.errors import SampleWarning, TrajectoryError
+from jounce.errors import RecordingWarning, SampleWarning, TrajectoryError
 from jounce.jet import Jet
 from jounce.trajectory import (
     CycloidalMotion,
@@ -171,6 +171,15 @@ def test_warning_with_too_few_samples_to_compare():
     few = np.linspace(0.0, 2.0, 7)
     with pytest.warns(SampleWarning, match="cannot be known from them"):
         JointTrajectory.from_samples(few, sine(few, 0)[:, None], ["a"]).derivatives([1.0], 1)
+
+
+def test_a_gap_between_samples_is_told_of():
+    """A pulse that is within the gap leaves the estimate as it is."""
+    times = SAMPLES[(SAMPLES < 0.8) | (SAMPLES > 1.25)]
+    values = np.sin(times) + np.exp(-(((times - 1.0) / 0.03) ** 2))
+    with pytest.warns(RecordingWarning, match=r"no samples between t = 0\.78 and 1\.26 s: the motion there is what a"):
+        trajectory = JointTrajectory.from_samples(times, values[:, None], ["a"])
+    assert trajectory.estimate_error(0)[0, 0] < 1e-6 < 0.9 < 1 + np.sin(1) - trajectory.derivatives([1.0], 0)[0, 0, 0]
 
 
 def test_a_joint_that_stands_still_has_no_error():

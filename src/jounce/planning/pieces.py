@@ -29,10 +29,19 @@ class JoinedPieces(SplineMotion):
 
 
 class SmoothPieces(JoinedPieces):
-    """A spline with all derivatives below its degree continuous."""
+    """A spline with all derivatives below its degree continuous.
 
-    def __init__(self, begins: np.ndarray, powers: np.ndarray, stop: float):
+    Parameters
+    ----------
+    begins, powers, stop
+        As for `JoinedPieces`.
+    errors : array_like of shape (powers,), optional
+        Errors of the derivatives, relative to their peaks, if they are those of a motion that is not known exactly.
+    """
+
+    def __init__(self, begins: np.ndarray, powers: np.ndarray, stop: float, errors: np.ndarray | None = None):
         super().__init__(begins, powers, stop)
+        self.samples.derived = errors
 
     @property
     def joined(self) -> int:

@@ -34,11 +34,10 @@ def smoothing_table(motion: SmoothedTrajectory) -> Table:
 
 
 def smoothing_words(motion: SmoothedTrajectory) -> str:
-    """Return a remark on joints whose motion follows noise, or an empty string."""
+    """Return what a smoothed motion does not say, and the joints whose motion follows noise."""
     loud = noisy_joints(motion)
-    if not loud:
-        return ""
-    return f"\nThe deviation is below three times the noise of {', '.join(loud)}: the motion follows noise there."
+    noise = f"\nThe deviation is below three times the noise of {', '.join(loud)}: the motion follows noise there."
+    return "\nDerivatives above the jerk, and second torque rates with them, are not known." + noise * bool(loud)
 
 
 def smoothing_result(

@@ -28,7 +28,7 @@ from jounce.trajectory.laws.stacking import evaluate_laws, law_derivatives
 from jounce.trajectory.laws.trapezoid import LIMITS
 from jounce.trajectory.laws.user_laws import given_law
 from jounce.trajectory.motion import SplineMotion
-from jounce.trajectory.sample_errors import TOLERANCE, unsupported_derivative, unsupported_words
+from jounce.trajectory.sample_errors import TOLERANCE, unsupported_derivative, unsupported_words, warn_of_gap
 from jounce.trajectory.sampled.deferred import Laws, SampledLaw, law_through
 from jounce.trajectory.splines import check_odd
 from jounce.units.instants import interval_text
@@ -141,6 +141,11 @@ class JointTrajectory(Displayed):
         TrajectoryError
             If the samples are too few for the degree, not finite, not increasing in time, or of the wrong shape.
 
+        Warns
+        -----
+        RecordingWarning
+            If a step between samples is more than twenty usual ones, which `estimate_error` cannot account for.
+
         Examples
         --------
         >>> import numpy as np
@@ -160,6 +165,7 @@ class JointTrajectory(Displayed):
             laws = {name: law_through(times, column, degree) for name, column in zip(names, positions.T, strict=True)}
         except MechanismError as error:
             raise TrajectoryError(error.message, name=error.name, value=error.value) from None
+        warn_of_gap(times)
         return cls(laws, times[0], times[-1], times)
 
     @classmethod
@@ -306,7 +312,8 @@ class JointTrajectory(Displayed):
         The error of interpolation is estimated from splines through every second sample. Three standard deviations of
         the noise of the samples (including rounding and quantization), as amplified by the splines, are added. The
         estimate is conservative: 1 to 10 times the true error for the degrees 3 and 5, up to 30 times for 7, measured
-        on sines and Gaussians.
+        on sines and Gaussians. Those of smoothed samples (`jounce.smooth`) are three standard errors for position to
+        jerk; jounce and what is above it are unknown.
 
         Parameters
         ----------

@@ -174,12 +174,10 @@ class SplineMotion(AbstractMotion):
     @property
     def errors(self) -> np.ndarray:
         """Estimated errors of the derivatives, relative to their peaks, (degree + 1,); 0 for a law without samples."""
-        if self.samples.value is None:
-            return np.zeros(self.degree + 1)
-        if self.samples.derived is None:
+        if self.samples.derived is None and self.samples.value is not None:
             times, values = self.samples.value
             self.samples.derived = derivative_errors(times, values, self.degree)
-        return self.samples.derived
+        return np.zeros(self.degree + 1) if self.samples.derived is None else self.samples.derived
 
     def check_instants(self, first: float, last: float) -> None:
         """Raise MechanismError if the law is not defined at some instants between two instants, s."""

@@ -1,13 +1,18 @@
 """Estimated errors of the derivatives of a spline through samples of a motion."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from jounce.errors import RecordingWarning, warn_caller
+
 INTERPOLATION_SAFETY, NOISE_SAFETY = 2.0, 3.0
 TOLERANCE = 0.1  # largest error of a supported derivative, relative to its peak
+GAP = 20  # times the median step, beyond which a spline says little about the motion between two samples
+BRIDGED = "the motion there is what a spline makes of those beside"
 BLOCKS, BLOCK = 8, 2500  # parts of very many samples, and samples in each
 
 
@@ -43,9 +48,15 @@ def derivative_errors(
         return np.zeros(degree + 1)
     blocks = _blocks(len(times))
     by_block = [_absolute(times[block], values[block], degree) for block in blocks]
-    scatter, period = float(np.ptp(values)), float(times[-1] - times[0])
-    min_peaks = scatter / 2 * (2 * math.pi / period) ** np.arange(degree + 1)
     errors, peaks = np.max([f[0] for f in by_block], axis=0), np.max([f[1] for f in by_block], axis=0)
+    return relative_errors(errors, peaks, float(np.ptp(values)), float(times[-1] - times[0]))
+
+
+def relative_errors(
+    errors: Float[np.ndarray, " derivative"], peaks: Float[np.ndarray, " derivative"], scatter: float, period: float
+) -> Float[np.ndarray, " derivative"]:
+    """Return errors relative to peaks that are no less than those of one period of a sine with a range; 1 at most."""
+    min_peaks = scatter / 2 * (2 * math.pi / period) ** np.arange(len(errors))
     return np.minimum(1.0, errors / np.maximum(peaks, min_peaks))
 
 
@@ -77,6 +88,23 @@ def _absolute(times: np.ndarray, values: np.ndarray, degree: int) -> tuple[np.nd
     return errors, peaks
 
 
+def longest_gap(times: Float[np.ndarray, " samples"], line: Callable[[int], str] = lambda _: "") -> str:
+    """Return where the longest gap between samples is, with the line of the sample after it; empty without gaps."""
+    steps = np.diff(times)
+    gaps = np.flatnonzero(steps > GAP * np.median(steps)) if len(steps) else []
+    if not len(gaps):
+        return ""
+    k = int(gaps[np.argmax(steps[gaps])])
+    remark = f", the longest of {len(gaps)} gaps" if len(gaps) > 1 else ""
+    return f"no samples between t = {times[k]:.6g} and {times[k + 1]:.6g} s{line(k + 1)}{remark}"
+
+
+def warn_of_gap(times: Float[np.ndarray, " samples"]) -> None:
+    """Warn of a gap between the samples of a trajectory."""
+    if phrase := longest_gap(times):
+        warn_caller(RecordingWarning(f"{phrase}: {BRIDGED}"))
+
+
 def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int) -> tuple[int, float] | None:
     """Return the lowest derivative up to an order whose error exceeds the tolerance, with the error; None if none does.
 
@@ -95,8 +123,13 @@ def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int)
 
 
 def unsupported_words(name: str, order: int, error: float, law: Any, by: str = "") -> str:
-    """Return why the samples of a `SplineMotion` do not support a derivative, with a remedy."""
+    """Return why the samples of a `SplineMotion`, which may be smoothed, do not support a derivative, with a remedy."""
     size = "cannot be known from them" if error >= 1 else f"is about {100 * error:.0f} %"
+    if law.samples.value is None:
+        remedy = "sample more exactly, request a lower order, or give an expression or a profile of the motion"
+        return (
+            f"smoothed samples of '{name}' do not support its derivative of order {order}: its error {size}; {remedy}"
+        )
     with_rates = law.joined < law.degree - 1
     if order >= law.degree:
         remedy = "leave out the rates beside them" if with_rates else "choose a higher degree"

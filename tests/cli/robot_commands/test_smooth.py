@@ -22,6 +22,7 @@ def test_a_log_is_smoothed_written_and_read(tmp_path, capsys):
     assert main(["smooth", robot, str(log), "--deviation", "6e-5", "--out", str(out), "--rate", "200Hz"]) == 0
     said = capsys.readouterr().out
     assert "401 rows from 0 s to 2 s, within 6e-05 rad or m of each sample" in said
+    assert "second torque rates with them, are not known" in said
     again = jn.load_trajectory(out)
     jerk = again.derivatives(np.linspace(0, 2, 201), 3)[:, 3, 0]
     assert abs(np.abs(jerk).max() / 8 - 1) < 0.2

@@ -98,9 +98,11 @@ def test_samples_beside_a_gap_are_no_outliers():
     times = np.linspace(0.0, 4.0, 801)
     times = times[(times < 1.5) | (times > 2.5)]
     values = np.sin(3 * times) + 1e-5 * np.random.default_rng(2).normal(size=times.size)
+    with pytest.warns(jn.errors.RecordingWarning, match=r"no samples between t = 1\.\d* and 2\.\d* s: the motion"):
+        log = jn.JointTrajectory.from_samples(times, values[:, None], ["a"])
     with warnings.catch_warnings():
         warnings.simplefilter("error", jn.errors.RecordingWarning)
-        jn.smooth(jn.JointTrajectory.from_samples(times, values[:, None], ["a"]), 1e-4)
+        jn.smooth(log, 1e-4)
 
 
 @pytest.mark.parametrize("name", MOTIONS)
@@ -152,12 +154,38 @@ def test_standard_errors_are_those_of_many_logs(rate, size):
     for seed in range(12):
         values = exact[0] + size * np.random.default_rng(seed).normal(size=len(times))
         motion, _, found = law_of(times, values, 6 * size)
-        errors = motion.derivatives(times, 3)[:, :, 0].T - exact
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", jn.errors.SampleWarning)
+            errors = motion.derivatives(times, 3)[:, :, 0].T - exact
         squares.append([(errors[:, inner] ** 2).mean(axis=1), (errors[:, [0, -1]] ** 2).mean(axis=1)])
         stated.append(found.standard_errors)
     within, ends = np.sqrt(np.mean(squares, axis=0)) / np.mean(stated, axis=0)
     assert ((within > 0.25) & (within < 1.1)).all()  # a sine is smoother than a motion whose jounce is noise
     assert (np.abs(np.log(ends / [2.7, 6.7, 6.8, 2.8])) < 0.4).all()
+
+
+@pytest.mark.parametrize("noise, supported", [(1e-7, 3), (1e-5, 2)])
+def test_estimated_errors_are_those_of_the_motion(noise, supported):
+    """To the jerk they are above those of 99 percent; the jounce of such samples is off by more than half its peak."""
+    times, rate = np.arange(0, 3 + 1e-9, 2e-3), 2 * np.pi
+    sine = np.stack([0.5 * rate**k * np.sin(rate * times + 0.4 + k * np.pi / 2) for k in range(5)])
+    motion, _, _ = law_of(times, sine[0] + noise * np.random.default_rng(1).normal(size=len(times)), 5 * noise)
+    motion.derivatives(times, supported)
+    with pytest.warns(jn.errors.SampleWarning, match=f"smoothed samples of 'a' .* of order {supported + 1}: its error"):
+        found = motion.derivatives(times, 4)[:, :, 0].T
+    inner = (times > 0.3) & (times < 2.7)
+    errors = np.quantile(np.abs(found - sine)[:, inner], 0.99, axis=1) / np.abs(sine).max(axis=1)
+    estimated = motion.estimate_error(4)[:, 0]
+    assert (errors < estimated).all()
+    assert (estimated[:4] < 10 * errors[:4]).all()
+    assert (estimated[4], motion.supported_order()) == (1, supported)
+    assert errors[4] > 0.5
+
+
+def test_a_joint_that_rests_has_no_errors():
+    noisy = 1e-4 * np.random.default_rng(1).normal(size=201)
+    motion, _, _ = law_of(np.linspace(0, 1, 201), noisy, 1e-3)
+    assert not motion.estimate_error(6).any()
 
 
 def test_a_deviation_below_the_noise_is_kept_where_it_can_be():

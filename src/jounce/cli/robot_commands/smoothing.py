@@ -85,8 +85,7 @@ def smooth(
             f"{rows}from {interval_text(motion.start, motion.stop)}, within {allowed:.3g} rad or m of each sample"
         )
         show_table(smoothing_table(motion))
-        if phrase := smoothing_words(motion):
-            print_text(phrase)
+        print_text(smoothing_words(motion))
     if output.out is not None:
         output.write_parts(_parts(model, motion, times), len(times))
     if figure is not None:

@@ -13,6 +13,7 @@ from jaxtyping import Int
 
 from jounce.errors import TrajectoryError
 from jounce.io.trajectories.recordings import Recording
+from jounce.trajectory.sample_errors import BRIDGED, longest_gap
 
 NANO = 10**9  # ns in a second
 EPOCH = 1e8
@@ -22,7 +23,6 @@ SCALES = ((1e17, 9, "ns"), (1e14, 6, "us"), (1e11, 3, "ms"), (EPOCH, 0, "s"))
 MOST_REPEATED = 0.5  # largest share of repeated stamps
 BACK = 40  # number of steps by which a row may be late
 ROUGHER = 1.5  # largest ratio of the path lengths in the order of stamps and in that of the file
-GAP = 20  # times the median step, beyond which a spline says little about the motion between two samples
 _DATE = re.compile(
     r"(?P<date>[0-9]{4}-[0-9]{2}-[0-9]{2})[T ](?P<time>[0-9]{2}:[0-9]{2}:[0-9]{2})(?P<part>[.,][0-9]+)?"
     r"\s*(?P<zone>Z|[-+][0-9]{2}:?[0-9]{2})?"
@@ -152,18 +152,11 @@ def gaps(recording: Recording) -> list[str]:
     notes: dict[str, list[str]] = {}
     for joint, name in enumerate(recording.names):
         rows = np.flatnonzero(~np.isnan(recording.values[:, 0, joint]))
-        times = recording.times[rows]
-        steps = np.diff(times)
-        gap_indices = np.flatnonzero(steps > GAP * np.median(steps)) if len(steps) else []
-        if not len(gap_indices):
-            continue
-        k = int(gap_indices[np.argmax(steps[gap_indices])])
-        line = f" (line {recording.lines[rows[k + 1]]})" if len(recording.lines) else ""
-        remark = f", the longest of {len(gap_indices)} gaps" if len(gap_indices) > 1 else ""
-        phrase = f"no samples between t = {times[k]:.6g} and {times[k + 1]:.6g} s{line}{remark}"
-        notes.setdefault(phrase, []).append(name)
-    advice = "the motion there is what a spline makes of those beside"
-    return [f"{phrase}, of {', '.join(names)}: {advice}" for phrase, names in notes.items()]
+        lines = recording.lines
+        phrase = longest_gap(recording.times[rows], lambda k: f" (line {lines[rows[k]]})" if len(lines) else "")
+        if phrase:
+            notes.setdefault(phrase, []).append(name)
+    return [f"{phrase}, of {', '.join(names)}: {BRIDGED}" for phrase, names in notes.items()]
 
 
 def _sorted(recording: Recording, steps: np.ndarray) -> Recording:

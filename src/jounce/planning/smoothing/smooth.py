@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -19,6 +20,7 @@ from jounce.planning.smoothing.dwells import Dwell, dwells, noise_of, without_ma
 from jounce.planning.smoothing.weights import IntervalEstimate, interval_estimates
 from jounce.trajectory import AbstractMotion, HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 from jounce.trajectory.checks import positive
+from jounce.trajectory.sample_errors import NOISE_SAFETY, relative_errors
 from jounce.trajectory.sampled.deferred import SampledLaw
 from jounce.trajectory.splines import local_powers
 from jounce.units.instants import time_text
@@ -280,12 +282,23 @@ def smoothed_samples(
     for dwell in rests:  # exactly at rest, not only to rounding
         is_resting = (curve.knots[:-1] >= times[dwell.first]) & (curve.knots[:-1] < times[dwell.last])
         powers[0, is_resting], powers[1:, is_resting] = dwell.position, 0.0
-    law = SmoothPieces(curve.knots[:-1], powers, float(curve.knots[-1]))
+    errors = np.max([estimate.standard_errors for estimate in estimates], axis=0)
+    law = SmoothPieces(curve.knots[:-1], powers, float(curve.knots[-1]), _relative(errors, powers, times))
     intervals = tuple((float(times[d.first]), float(times[d.last])) for d in rests)
     rates = [estimate.cutoff / (2 * np.pi) for estimate in estimates]
     noise = max(sigma, float(np.median([estimate.noise for estimate in estimates])))
-    errors = np.max([estimate.standard_errors for estimate in estimates], axis=0)
     return law, SmoothedJoint(noise, curve.away, intervals, (min(rates), max(rates)), tuple(errors.tolist()))
+
+
+def _relative(
+    errors: Float[np.ndarray, " known"], powers: Float[np.ndarray, "power piece"], times: Float[np.ndarray, " sample"]
+) -> Float[np.ndarray, " derivative"]:
+    """Return three standard errors of the derivatives relative to their peaks; 1 for those that have none."""
+    if not powers[1:].any():  # it rests
+        return np.zeros(len(powers))
+    peaks = np.array([math.factorial(k) * max(row.max(), -row.min()) for k, row in enumerate(powers)])
+    whole_errors = np.append(NOISE_SAFETY * errors, np.full(len(powers) - len(errors), np.inf))
+    return relative_errors(whole_errors, peaks, float(np.ptp(powers[0])), float(times[-1] - times[0]))
 
 
 def _dwells_and_estimates(
