@@ -1,7 +1,7 @@
 """Estimated errors of the derivatives of a spline through samples of a motion."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -88,15 +88,16 @@ def _absolute(times: np.ndarray, values: np.ndarray, degree: int) -> tuple[np.nd
     return errors, peaks
 
 
-def longest_gap(times: Float[np.ndarray, " samples"], line: Callable[[int], str] = lambda _: "") -> str:
-    """Return where the longest gap between samples is, with the line of the sample after it; empty without gaps."""
+def longest_gap(times: Float[np.ndarray, " samples"], lines: Sequence[int] = ()) -> str:
+    """Return where the longest gap between samples is, with the line of the one after it; empty without gaps."""
     steps = np.diff(times)
     gaps = np.flatnonzero(steps > GAP * np.median(steps)) if len(steps) else []
     if not len(gaps):
         return ""
     k = int(gaps[np.argmax(steps[gaps])])
+    line = f" (line {lines[k + 1]})" if lines else ""
     remark = f", the longest of {len(gaps)} gaps" if len(gaps) > 1 else ""
-    return f"no samples between t = {times[k]:.6g} and {times[k + 1]:.6g} s{line(k + 1)}{remark}"
+    return f"no samples between t = {times[k]:.6g} and {times[k + 1]:.6g} s{line}{remark}"
 
 
 def warn_of_gap(times: Float[np.ndarray, " samples"]) -> None:
@@ -125,19 +126,17 @@ def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int)
 def unsupported_words(name: str, order: int, error: float, law: Any, by: str = "") -> str:
     """Return why the samples of a `SplineMotion`, which may be smoothed, do not support a derivative, with a remedy."""
     size = "cannot be known from them" if error >= 1 else f"is about {100 * error:.0f} %"
-    if law.samples.value is None:
-        remedy = "sample more exactly, request a lower order, or give an expression or a profile of the motion"
-        return (
-            f"smoothed samples of '{name}' do not support its derivative of order {order}: its error {size}; {remedy}"
-        )
-    with_rates = law.joined < law.degree - 1
-    if order >= law.degree:
+    with_rates, is_smoothed = law.joined < law.degree - 1, law.samples.value is None
+    if is_smoothed:
+        cause = "sample more exactly, request a lower order, or give an expression or a profile of the motion"
+    elif order >= law.degree:
         remedy = "leave out the rates beside them" if with_rates else "choose a higher degree"
         cause = f"splines of degree {law.degree} have continuous derivatives to order {law.joined}; {remedy}"
     else:
         remedy = f"smooth them{by}, or leave out the rates beside them" if with_rates else f"or smooth the samples{by}"
         cause = f"sample more often or more exactly, {remedy}"
-    return f"samples of '{name}' do not support its derivative of order {order}: its error {size}; {cause}"
+    samples = "smoothed samples" if is_smoothed else "samples"
+    return f"{samples} of '{name}' do not support its derivative of order {order}: its error {size}; {cause}"
 
 
 def noise(times: Float[np.ndarray, " samples"], values: Float[np.ndarray, " samples"]) -> float:

@@ -152,9 +152,8 @@ def gaps(recording: Recording) -> list[str]:
     notes: dict[str, list[str]] = {}
     for joint, name in enumerate(recording.names):
         rows = np.flatnonzero(~np.isnan(recording.values[:, 0, joint]))
-        lines = recording.lines
-        phrase = longest_gap(recording.times[rows], lambda k: f" (line {lines[rows[k]]})" if len(lines) else "")
-        if phrase:
+        lines = np.asarray(recording.lines)[rows].tolist() if len(recording.lines) else ()
+        if phrase := longest_gap(recording.times[rows], lines):
             notes.setdefault(phrase, []).append(name)
     return [f"{phrase}, of {', '.join(names)}: {BRIDGED}" for phrase, names in notes.items()]
 
