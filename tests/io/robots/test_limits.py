@@ -301,6 +301,27 @@ def test_limits_of_moveit(read):
     assert read(alone.replace("/**", "/move_group"))["pin"] == jn.Limits(velocity=3.0, effort=7.0)
 
 
+CONTROLLERS = """
+controller_manager:
+  ros__parameters: {update_rate: 100, arm_controller: {type: joint_trajectory_controller/JointTrajectoryController}}
+arm_controller:
+  ros__parameters:
+    joints: [pin, slide]
+    constraints: {pin: {trajectory: 0.1}}
+    joint_limits: {pin: {has_velocity_limits: true, max_velocity: 1.5}}
+"""
+
+
+def test_limits_among_the_parameters_of_controllers(read, refused):
+    assert read(CONTROLLERS)["pin"] == jn.Limits(velocity=1.5, effort=5.0)
+    none = CONTROLLERS.replace("joint_limits", "gains")
+    assert refused(none).startswith("line 2, controller_manager: these parameters hold no joint_limits; a limits file")
+    twice = CONTROLLERS + "    hand: {joint_limits: {pin: {max_velocity: 2}}}"
+    assert "several places: arm_controller.ros__parameters.joint_limits (line 8), arm_controller." in refused(twice)
+    with pytest.warns(jn.errors.RobotWarning, match=r"joint_limits: left out: tool_limits$"):
+        read(CONTROLLERS + "    tool_limits: {speed: 2}")
+
+
 @pytest.mark.parametrize("deceleration", [-5.0, 5, -5])
 def test_decelerations_of_pilz_are_below_zero_and_those_of_ros2_control_above(read, deceleration):
     text = f"joint_limits: {{pin: {{has_deceleration_limits: true, max_deceleration: {deceleration}}}}}"

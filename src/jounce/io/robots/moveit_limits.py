@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from jounce.errors import RobotWarning, no_such, warn_caller
 from jounce.io.files.located_data import Location, Source, dotted
 from jounce.robot.robot import Robot
 
-WRAPPERS = ("/**", "ros__parameters", "robot_description_planning")
-"""Keys that may stand around ``joint_limits``, one within the other, as may the name of a node."""
+OURS = ("default", "joints", "points")
+LIMITS_KEY = "joint_limits"
+PARAMETERS = ("ros__parameters", "robot_description_planning", "robot_description_kinematics")
+MOST_NESTED = 8
 CARTESIAN = "cartesian_limits"
 SCALES = ("default_velocity_scaling_factor", "default_acceleration_scaling_factor")
 LIMITS = {
@@ -36,17 +39,24 @@ def moveit_limits(source: Source, robot: Robot) -> dict[str, dict[str, tuple[Any
     Raises
     ------
     RobotError
-        If a key is unknown, a flag is none, or no joint is one of the robot.
+        If a key of a joint is unknown, a flag is none, or no joint is one of the robot.
     """
-    base: Location = ()
-    data = source.data
-    while isinstance(data, dict) and len(data) == 1 and _is_wrapper(*next(iter(data.items()))):
-        key = next(iter(data))
-        base, data = (*base, key), data[key]
-    if not isinstance(data, dict) or "joint_limits" not in data:
+    if not isinstance(source.data, dict) or source.data.keys() & set(OURS):
         return None
-    source.mapping(base, ("joint_limits", *SCALES, CARTESIAN))
-    base = (*base, "joint_limits")
+    locations = list(_locations(source.data))
+    if not locations:
+        node = next((key for key, entry in source.data.items() if _has_parameters(key, entry)), None)
+        if node is None:
+            return None
+        message = f"these parameters hold no {LIMITS_KEY}; a limits file of jounce has the keys {', '.join(OURS)}"
+        raise source.error(message, (node,))
+    if len(locations) > 1:
+        lines = ", ".join(f"{dotted(location)} (line {source.line(location)})" for location in locations)
+        raise source.error(f"{LIMITS_KEY} are in several places: {lines}; keep one", locations[1])
+    (base,) = locations
+    data = source.data
+    for key in base[:-1]:
+        data = data[key]
     joints = source.mapping(base)
     unknown = [name for name in joints if name not in robot.joint_names]
     if len(unknown) == len(joints):
@@ -55,6 +65,8 @@ def moveit_limits(source: Source, robot: Robot) -> dict[str, dict[str, tuple[Any
     scales = [f"{key}: {data[key]}" for key in SCALES if data.get(key, 1) != 1]
     if scales:
         notes.append(f"{', '.join(scales)} do not count, as limits are those of joint_limits")
+    if others := [str(key) for key in data if "limit" in str(key) and key not in (LIMITS_KEY, CARTESIAN)]:
+        notes.append(f"left out: {', '.join(others)}")
     if CARTESIAN in data:
         notes.append(f"{CARTESIAN} are left out: limits of the speed of a tool are `points` of a limits file of jounce")
     if soft := [name for name in joints if name not in unknown and source.mapping((*base, name)).get(SOFT) is True]:
@@ -64,9 +76,18 @@ def moveit_limits(source: Source, robot: Robot) -> dict[str, dict[str, tuple[Any
     return {name: _of(source, (*base, name)) for name in joints if name not in unknown}
 
 
-def _is_wrapper(key: Any, entry: Any) -> bool:
-    """Return whether a key stands around limits: one of `WRAPPERS`, or a node with its parameters."""
-    return key in WRAPPERS or (isinstance(entry, dict) and list(entry) == ["ros__parameters"])
+def _locations(data: dict[Any, Any], outer: Location = ()) -> Iterator[Location]:
+    """Yield the locations of limits of joints among the parameters of nodes."""
+    for key, entry in data.items():
+        if key == LIMITS_KEY:
+            yield (*outer, key)
+        elif isinstance(entry, dict) and len(outer) < MOST_NESTED:
+            yield from _locations(entry, (*outer, key))
+
+
+def _has_parameters(key: Any, entry: Any) -> bool:
+    """Return whether an entry of a file has parameters of ROS, or of the planning of MoveIt."""
+    return key in PARAMETERS or (isinstance(entry, dict) and any(_has_parameters(*item) for item in entry.items()))
 
 
 def _of(source: Source, location: Location) -> dict[str, tuple[Any, Location]]:
