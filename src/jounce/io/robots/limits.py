@@ -60,8 +60,8 @@ def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
     force) and ``effort_rate``. A value is a number in SI units or a number with a unit; ``null`` removes a limit. The
     entry of a joint precedes ``default``, which precedes the robot's own limits; limits of joints that follow others
     hold as well. A default with a unit of angle or torque holds for joints that turn, one with a unit of length or
-    force for joints that slide. The ``joint_limits`` of MoveIt and ros2_control are read, with the keys ``max_velocity``,
-    ``has_velocity_limits`` and so on, wherever they are among the parameters of nodes.
+    force for joints that slide. The ``joint_limits`` of MoveIt and ros2_control are read, with the keys
+    ``max_velocity``, ``has_velocity_limits`` and so on, wherever they are among the parameters of nodes.
 
     Parameters
     ----------
