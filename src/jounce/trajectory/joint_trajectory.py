@@ -312,8 +312,7 @@ class JointTrajectory(Displayed):
         The error of interpolation is estimated from splines through every second sample. Three standard deviations of
         the noise of the samples (including rounding and quantization), as amplified by the splines, are added. The
         estimate is conservative: 1 to 10 times the true error for the degrees 3 and 5, up to 30 times for 7, measured
-        on sines and Gaussians. Those of smoothed samples (`jounce.smooth`) are three standard errors for position to
-        jerk; jounce and what is above it are unknown.
+        on sines and Gaussians. For smoothed samples it is three standard errors up to the jerk, and unknown above.
 
         Parameters
         ----------
