@@ -129,7 +129,7 @@ class RobotReading:
     as_controller
         Interpolate as joint_trajectory_controller of ros2_control.
     topic
-        Topic to read from a bag, such as /joint_states.
+        Topic of a bag or of JSON lines, such as /joint_states.
     joints
         Joints to read, such as a,b; export writes them in this order.
     model

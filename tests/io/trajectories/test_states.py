@@ -1,5 +1,7 @@
 """States of joints that ROS prints: interrupted printouts, dynamic states, joints of several coordinates."""
 
+import json
+
 import numpy as np
 import pytest
 import yaml
@@ -39,6 +41,50 @@ def test_whole_echoes_are_read_whole(tmp_path, text):
     assert not any("not printed to its end" in x for x in words)
 
 
+WRAPPED = {
+    "rosbridge": ({"op": "subscribe", "topic": "/arm"}, lambda x: {"op": "publish", "topic": "/arm", "msg": x}),
+    "mcap": ({"topic": "/imu", "data": {"x": 1}}, lambda x: {"topic": "/arm", "sequence": 3, "data": x}),
+    "alone": (None, lambda x: x),
+}
+
+
+@pytest.mark.parametrize("ending", [".jsonl", ".json"])
+@pytest.mark.parametrize("kind", WRAPPED)
+def test_states_as_json_lines(tmp_path, kind, ending):
+    """Of rosbridge, of `mcap cat --json`, and of messages alone; a last line that is not whole is left out."""
+    other, wrapped = WRAPPED[kind]
+    lines = [json.dumps(x) for x in ([other] if other else []) + [wrapped(state) for state in states(TIMES)]]
+    for cut, count in ((0, len(TIMES)), (25, len(TIMES) - 1)):
+        text = "\n".join(lines)
+        trajectory, words = read(tmp_path, text[: len(text) - cut], f"log{ending}")
+        np.testing.assert_allclose(trajectory.times, TIMES[:count], rtol=0, atol=1e-12)
+        laws = jn.JointTrajectory({name: trajectory.laws[name] for name in JOINTS}, 0.0, trajectory.stop)
+        expected = np.stack([motion(TIMES[:count], k) for k in (0, 1)], axis=1)
+        np.testing.assert_allclose(laws.derivatives(TIMES[:count], 1), expected, rtol=0, atol=1e-9)
+        assert any(f"from line {len(lines)}, was not printed to its end" in x for x in words) is (cut > 0)
+
+
+def test_topics_of_json_lines_are_chosen(tmp_path):
+    """Errors have the lines of the file."""
+    points = [{"positions": [0.5 * k], "time_from_start": {"secs": k, "nsecs": 0}} for k in range(3)]
+    goal = {"op": "publish", "topic": "/goal", "msg": {"joint_names": ["a"], "points": points}}
+    path = tmp_path / "log.jsonl"
+    logged = [{"op": "publish", "topic": "/arm", "msg": state} for state in states(TIMES)]
+    path.write_text("\n".join(map(json.dumps, [goal, *logged])))
+    assert jn.load_trajectory(path, topic="/goal").stop == 2.0
+    with pytest.raises(TrajectoryError, match="several topics of joint states or trajectories; choose one: /goal, /ar"):
+        jn.load_trajectory(path)
+    with pytest.raises(TrajectoryError, match=r"no topic of joint states or trajectories .* did you mean '/goal'"):
+        jn.load_trajectory(path, topic="/gaol")
+    logged[4]["msg"]["position"][0] = "far"
+    path.write_text("\n".join(map(json.dumps, logged)))
+    with pytest.raises(TrajectoryError, match=r"line 5, .*position: must be \d finite numbers"):
+        jn.load_trajectory(path)
+    path.write_text(json.dumps({"op": "publish", "topic": "/imu", "msg": {"x": 1}}))
+    with pytest.raises(TrajectoryError, match=r"no topic of joint states or a trajectory, got \['/imu'\]"):
+        jn.load_trajectory(path)
+
+
 def test_states_of_a_controller_may_be_interrupted(tmp_path):
     text = yaml.safe_dump_all(controller_states("feedback"), sort_keys=False)
     trajectory, words = read(tmp_path, text[: text.rindex("velocities")])
@@ -72,7 +118,7 @@ def test_two_documents_of_laws_stay_refused(tmp_path):
     path = tmp_path / "laws.yaml"
     laws = "joints: {a: t}\ntime: {start: 0, stop: 1, step: 0.5}"
     path.write_text(laws + "\n---\n" + laws)
-    with pytest.raises(TrajectoryError, match="line 4: a second YAML document starts"):
+    with pytest.raises(TrajectoryError, match="line 4: a second document starts"):
         jn.load_trajectory(path)
 
 

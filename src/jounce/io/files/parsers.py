@@ -149,21 +149,29 @@ def _yaml_error(path: str, error: Exception, lines: list[str]) -> MechanismFileE
     )
 
 
+_SPACE = re.compile(r"\s*")
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[{}\[\]:,]|[^\s{}\[\]:,"]+')
 
 
-def read_json(path: str, text: str) -> Source:
-    """Return the data of JSON text; the standard library checks the syntax, a pass over the tokens finds the lines."""
+def read_json(path: str, text: str, *, many: bool = False) -> Source:
+    """Return the data of JSON text; the standard library checks the syntax, a pass over the tokens finds the lines.
+
+    With `many`, several values may follow one another, as in JSON lines: the data are then their list.
+    """
     _check_depth(path, text)
     try:
-        json.loads(text)
+        count, end = _json_values(text) if many else (len([json.loads(text)]), len(text))
     except json.JSONDecodeError as error:
         raise MechanismFileError(
             f"the JSON cannot be read at column {error.colno}: {error.msg}", path=path, line=error.lineno
         ) from None
     except (ValueError, RecursionError):
         raise MechanismFileError("the JSON cannot be read: a number has too many digits", path=path) from None
-    builder = Builder(path)
+    builder = _builder(path, many=count > 1)
+    builder.source.several = count > 1
+    if end < len(text):
+        builder.source.unfinished = text.count("\n", 0, end) + 1
+        text = text[:end]
     line, position = 1, 0
     for token in _TOKEN.finditer(text):
         line += text.count("\n", position, token.start())
@@ -182,6 +190,27 @@ def read_json(path: str, text: str) -> Source:
             case leaf:
                 builder.value(json.loads(leaf), line)
     return builder.source
+
+
+def _json_values(text: str) -> tuple[int, int]:
+    """Return the number of values that follow one another, and their end, before a last one that is not whole.
+
+    Raises
+    ------
+    JSONDecodeError
+        If another one is not valid.
+    """
+    decoder, count = json.JSONDecoder(), 0
+    begin = _SPACE.match(text).end()  # type: ignore[union-attr] - it matches anything
+    while begin < len(text) or not count:
+        try:
+            end = decoder.raw_decode(text, begin)[1]
+        except json.JSONDecodeError:
+            if count < 2 or "\n" in text[begin:].rstrip("\n"):
+                raise
+            return count, begin
+        count, begin = count + 1, _SPACE.match(text, end).end()  # type: ignore[union-attr]
+    return count, begin
 
 
 def _check_depth(path: str, text: str) -> None:

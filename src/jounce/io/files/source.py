@@ -14,6 +14,8 @@ from jounce.io.files.located_data import Source
 from jounce.io.files.reading import check_allowed, read_file
 
 MAX_LINES = 1_000_000
+LINES = (".jsonl", ".ndjson")
+"""Endings of JSON lines."""
 _DOCUMENT = re.compile(r"^---(?=\s|$)", re.MULTILINE)
 MAX_LINE_LENGTH = 100_000
 
@@ -59,8 +61,9 @@ def read_source(
     error_type : type
         Type of the exceptions, also of those that the source makes.
     many : bool, default False
-        Whether a YAML file may have several documents: its data are then the list of those that are not empty. A last
-        one that ends within a line, or is no YAML, is left out (`unfinished`), as a printout that was interrupted.
+        Whether a YAML file may have several documents, and a JSON file several values, as JSON lines: the data are then
+        the list of those that are not empty. A last one that ends within a line, or is no YAML or JSON, is left out
+        (`unfinished`), as a printout that was interrupted.
 
     Returns
     -------
@@ -77,15 +80,20 @@ def read_source(
     if not name:
         raise error_type("the name of a file is needed", value=name)
     suffix = Path(name).suffix.lower()
-    if suffix not in DATA_FILES and not os.path.isdir(name):  # noqa: PTH112 - no error of a long name
+    if suffix not in (*DATA_FILES, *(LINES if many else ())) and not os.path.isdir(name):  # noqa: PTH112 - no error of a long name
         raise error_type(
             f"the kind of a {kind} file is given by its extension; valid: {', '.join(DATA_FILES)}", path=name
         )
-    reader = {".toml": parsers.read_toml, ".json": parsers.read_json}.get(suffix, parsers.read_yaml)
+    json = dict.fromkeys((".json", *LINES), parsers.read_json)
+    reader = {".toml": parsers.read_toml, **json}.get(suffix, parsers.read_yaml)
     try:
         text = _decode(name, read_file(name))
-        has_many = many and reader is parsers.read_yaml and len(_DOCUMENT.findall(text)) > 0
-        source = _documents(name, text) if has_many else reader(name, text)
+        if many and reader is parsers.read_yaml and _DOCUMENT.search(text):
+            source = _documents(name, text)
+        elif many and reader is parsers.read_json:
+            source = parsers.read_json(name, text, many=True)
+        else:
+            source = reader(name, text)
         source.allow, source.error_type = check_allowed(allow), error_type
     except MechanismFileError as error:
         raise error_type(error.message, path=error.path, line=error.line, name=error.name, value=error.value) from None

@@ -9,12 +9,13 @@ from pathlib import Path
 
 from jounce.errors import TrajectoryError, check_name
 from jounce.io.files import DATA_FILES
-from jounce.io.files.source import read_source
+from jounce.io.files.source import LINES, read_source
 from jounce.io.trajectories.law_files import LawFile
 from jounce.io.trajectories.recorded_trajectories import trajectory_of
 from jounce.io.trajectories.recordings import Recording
 from jounce.io.trajectories.ros.bags import SUFFIXES, is_bag, read_bag
 from jounce.io.trajectories.ros.messages import is_message, read_messages
+from jounce.io.trajectories.ros.topics import is_published, published
 from jounce.io.trajectories.tables import read_recording
 from jounce.robot import Robot
 from jounce.settings import under_own_settings
@@ -59,12 +60,13 @@ def load_trajectory(
     plans and goals of ExecuteTrajectory of MoveIt, as YAML (also as printed by ``ros2 topic echo``) or JSON.
     Polynomials go through their positions, with velocities and accelerations if given. Joint states, echoed or in a bag
     (.bag, .db3, .mcap, or the folder of a bag; needs rosbags), are samples, as are the positions in dynamic joint
-    states, and the measured values in the states of joint_trajectory_controller.
+    states, and the measured values in the states of joint_trajectory_controller. JSON may have a message in each line,
+    as rosbridge sends it and ``mcap cat --json`` prints it.
 
     Parameters
     ----------
     path
-        File ending in .csv, .yaml, .yml, .toml or .json, or a bag.
+        File ending in .csv, .yaml, .yml, .toml, .json, .jsonl or .ndjson, or a bag.
     degree : int, default 5
         Degree of the splines through samples of positions only, odd from 3 to 11.
     allow
@@ -76,7 +78,8 @@ def load_trajectory(
         Whether to interpolate like joint_trajectory_controller of ros2_control: linearly between positions only, by
         cubics if velocities are given, by quintics if accelerations are given, too.
     topic : str, optional
-        Topic of a bag; by default that of the joint states, or of the only trajectory.
+        Topic of a bag, or of messages of rosbridge or mcap; by default that of the joint states, or of the only
+        trajectory.
     robot : Robot, optional
         Robot whose joints are meant in a file without names: all moving joints, or all that turn, in its order.
     samples : bool, default False
@@ -151,24 +154,33 @@ def load_recording(
     given = None if joints is None else tuple(joints)
     if is_bag(name):
         return read_bag(name, given, topic)
-    if topic is not None:
-        raise TrajectoryError("only bags have topics", path=name, name="topic", value=topic)
     suffix = Path(name).suffix.lower()
-    if suffix not in (".csv", *DATA_FILES):
+    if suffix not in (".csv", *DATA_FILES, *LINES):
         message = "the kind of a trajectory file is given by its extension"
-        raise TrajectoryError(f"{message}; valid: {', '.join(('.csv', *DATA_FILES, *SUFFIXES))}", path=name)
+        raise TrajectoryError(f"{message}; valid: {', '.join(('.csv', *DATA_FILES, *LINES, *SUFFIXES))}", path=name)
     if suffix == ".csv":
+        _check_no_topic(name, topic)
         return read_recording(name, given)
     source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError, many=True)
+    if is_published(source.data):
+        source = published(source, topic)
+    else:
+        _check_no_topic(name, topic)
     if is_message(source.data):
         return read_messages(source, given)
     if source.several or source.unfinished is not None:
         second = source.unfinished if source.unfinished is not None else source.lines.get((1,))
-        raise TrajectoryError("a second YAML document starts (---)", path=name, line=second)
+        raise TrajectoryError("a second document starts; keep one", path=name, line=second)
     if given is not None:
         message = "this file names its joints; give names for what controllers take only"
         raise TrajectoryError(message, path=name, name="joints")
     return LawFile(source)
+
+
+def _check_no_topic(name: str, topic: str | None) -> None:
+    if topic is not None:
+        message = "only bags, and messages of rosbridge or mcap, have topics"
+        raise TrajectoryError(message, path=name, name="topic", value=topic)
 
 
 def _named_by(recording: Recording, robot: Robot) -> Recording:
