@@ -24,7 +24,8 @@ def printed(code, *arguments):
 
 def test_all_that_the_stub_lists_is_there_and_comes_from_where_it_says():
     stub = ast.parse((HOME / "__init__.pyi").read_text(encoding="utf-8"))
-    imports = [line for line in stub.body if isinstance(line, ast.ImportFrom)]
+    every = [line for line in stub.body if isinstance(line, ast.ImportFrom)]
+    imports, subpackages = [line for line in every if line.module], [line for line in every if not line.module]
     names = [alias.name for line in imports for alias in line.names]
     assert 40 < len(names) == len(set(names)) < 60
     for line in imports:
@@ -35,6 +36,11 @@ def test_all_that_the_stub_lists_is_there_and_comes_from_where_it_says():
             )
     assert [*names, "__version__"] == jounce.__all__
     assert {*names, "__version__"} <= {*dir(jounce)}
+    (modules,) = ([alias.name for alias in line.names] for line in subpackages)
+    assert not {*modules} & {*jounce.__all__}
+    for name in modules:
+        assert name in dir(jounce)
+        assert getattr(jounce, name) is sys.modules[f"jounce.{name}"]
     with pytest.raises(AttributeError, match="module 'jounce' has no attribute 'sovle'") as caught:
         jounce.sovle  # noqa: B018 - what is looked for is the error
     assert (caught.value.name, caught.value.obj) == ("sovle", jounce)  # from which Python words "Did you mean"

@@ -39,7 +39,7 @@ _mark_forks()
 def __getattr__(name: str) -> Any:
     """Return a public object or a subpackage by name, imported at its first use."""
     if name == "__all__":
-        return [*_offered(), "__version__"]
+        return [*(name for name, source in _offered().items() if source != "."), "__version__"]
     subpackage = None if name.startswith("_") else _offered().get(name)
     if subpackage is None and (moved := _new_name(name)) is not None:
         warnings.warn(f"jounce.{name} is jounce.{moved} from release 0.5 on", DeprecationWarning, stacklevel=2)
@@ -48,7 +48,7 @@ def __getattr__(name: str) -> Any:
         message = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(message, name=name, obj=sys.modules[__name__])  # for Python's suggestions
     with _importing.lock, _importing.without_garbage_collection():
-        if subpackage in (None, __name__):
+        if subpackage in (None, ".", __name__):
             value = importlib.import_module(f"{__name__}.{name}")
         else:
             value = getattr(importlib.import_module(subpackage), name)

@@ -1,4 +1,7 @@
-"""What the package offers, and from where: the list that `__init__.py` imports when it is first needed."""
+"""What the package offers, and from where: the list that `__init__.py` imports when it is first needed.
+
+`from jounce import *` leaves out what comes from ".", whose names are those of others too, such as `io`.
+"""
 
 from jounce import (
     cams as cams,
@@ -89,5 +92,21 @@ from jounce.trajectory import (
     JointTrajectory as JointTrajectory,
 )
 from jounce.written_equations import equations as equations
+
+from . import (
+    design as design,
+    dynamics as dynamics,
+    integrate as integrate,
+    io as io,
+    jet as jet,
+    kinematics as kinematics,
+    papers as papers,
+    plot as plot,
+    progress as progress,
+    rigid as rigid,
+    testing as testing,
+    trajectory as trajectory,
+    viewer as viewer,
+)
 
 __version__: str

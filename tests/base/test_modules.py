@@ -4,7 +4,10 @@ import abc
 import copy
 import dataclasses
 import inspect
+import json
 import pickle
+import subprocess
+import sys
 from typing import Any
 
 import equinox as eqx
@@ -169,3 +172,23 @@ def test_a_class_with_an_abstract_method_has_no_objects():
 
     with pytest.raises(TypeError, match="abstract"):
         Law()
+
+
+@pytest.mark.slow
+def test_type_checkers_take_one_name_or_several_and_find_a_tuple(tmp_path):
+    (tmp_path / "pyrightconfig.json").write_text('{"typeCheckingMode": "standard"}')
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import jounce as jn\n"
+        'one = jn.outputs.AngleOutput("crank")\n'
+        'several = jn.forces.Spring(["ground", "crank"], [0, 0], [0, 0], 1.0, 0.1)\n'
+        "reveal_type(one.bodies)\n"
+        "reveal_type(several.bodies)\n"
+        "jn.outputs.AngleOutput(3)\n"
+    )
+    command = [sys.executable, "-m", "pyright", "-p", tmp_path, "--outputjson", "--pythonpath", sys.executable]
+    found = json.loads(subprocess.run(command, capture_output=True, text=True, check=False).stdout)
+    said = [(one["severity"], one["range"]["start"]["line"] + 1, one["message"]) for one in found["generalDiagnostics"]]
+    assert [(severity, line) for severity, line, _ in said] == [("information", 4), ("information", 5), ("error", 6)]
+    assert 'Type of "one.bodies" is "tuple[str, ...]"' in said[0][2]
+    assert 'Type of "several.bodies" is "tuple[str, ...]"' in said[1][2]

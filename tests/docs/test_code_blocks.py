@@ -53,6 +53,12 @@ def test_mechanism_files_in_the_pages_solve(page, tmp_path):
         assert (motion.status == jn.Status.OK).all()
 
 
+def test_what_pages_take_from_the_package_is_in_its_stub():
+    """Editors and type checkers know nothing else: they would underline the code of a page."""
+    used = {name for page in PAGES for _, code in blocks(page, "python") for name in re.findall(r"\bjn\.(\w+)", code)}
+    assert {"solve", "io", "dynamics"} <= used <= {*dir(jn)}
+
+
 def test_the_readme_and_the_start_page_have_code():
     found = [page.name for page in PAGES if any(blocks(page, "python"))]
     assert {"README.md", "start.md", "own_joint.md"} <= set(found)

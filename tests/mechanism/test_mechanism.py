@@ -167,6 +167,33 @@ def test_what_is_no_vector_of_numbers(vector):
         build(joint(planar.Revolute, vector, [0, 0]))
 
 
+@pytest.mark.parametrize(
+    "name, value, message",
+    [
+        ("joints", [PIN], r"^joints: must be a dictionary, with a name for each entry, got \[Revolute\("),
+        ("outputs", None, r"^outputs: must be a dictionary.*got nothing"),
+        ("initial", {"a": "t"}, r"^initial\.a: must be one of the classes of drivers, got 't'"),
+    ],
+)
+def test_what_is_no_dictionary_of_elements_is_refused_by_its_name(name, value, message):
+    given = mechanism()
+    object.__setattr__(given, name, value)  # past the checks of types, which users do not have
+    with pytest.raises(jn.errors.MechanismError, match=message):
+        given.__post_init__()
+
+
+@pytest.mark.parametrize(
+    "space, body, message",
+    [
+        ("planar", jn.Body([0, 0], orientation=[0, 0, 0, 1]), r"^bodies\.crank\.orientation: .* has an angle instead"),
+        ("spatial", jn.Body([0, 0, 0], 0.5), r"^bodies\.crank\.angle: .* has an orientation instead, got 0\.5$"),
+    ],
+)
+def test_an_attitude_in_the_form_of_the_other_space_is_refused(space, body, message):
+    with pytest.raises(jn.errors.MechanismError, match=message):
+        build(mechanism(space=space, bodies={"crank": body}, joints={}))
+
+
 def test_euler_parameters_that_are_all_zero():
     body = jn.Body(ORIGIN, orientation=[0, 0, 0, 0])
     ball = spatial.Spherical(("ground", "crank"), ORIGIN, ORIGIN)

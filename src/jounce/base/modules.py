@@ -10,12 +10,31 @@ import operator
 from abc import ABCMeta
 from collections.abc import Callable, Iterable, Mapping, Set
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, dataclass_transform
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, dataclass_transform, overload
 
 import jax
 import numpy as np
 
+if TYPE_CHECKING:
+
+    class Names:
+        """Names in a tuple, for which one name may be given: a descriptor, as mypy reads no converters."""
+
+        @overload
+        def __get__(self, instance: None, owner: Any) -> "Names": ...
+        @overload
+        def __get__(self, instance: object, owner: Any) -> tuple[str, ...]: ...
+        def __get__(self, instance: Any, owner: Any) -> Any: ...
+        def __set__(self, instance: Any, value: str | Iterable[str]) -> None: ...
+else:
+    Names = tuple[str, ...]
+
 _being_made: set[int] = set()  # identities of modules in `__init__`
+
+
+def as_names(given: str | Iterable[str]) -> tuple[str, ...]:
+    """Return one name or several as a tuple."""
+    return (given,) if isinstance(given, str) else tuple(given)
 
 
 def field(*, static: bool = False, converter: Callable[[Any], Any] | None = None, **options: Any) -> Any:

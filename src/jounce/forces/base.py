@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 import jax
 import jax.numpy as jnp
 
-from jounce.base.modules import Module, field
+from jounce.base.modules import Module, Names, as_names, field
 from jounce.constraints.base import catalogue, check_bodies, check_words, keep_words_static, register
 from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
 from jounce.jet import Jet
@@ -53,7 +53,7 @@ class AbstractForce(Module):
     5.0
     """
 
-    bodies: tuple[str, ...] = field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
+    bodies: Names = field(static=True, metadata={"converter": as_names})
 
     space: ClassVar[str] = ""  # planar or spatial, if only one makes sense
     role: ClassVar[str] = "force"

@@ -13,7 +13,7 @@ from jounce.jet.algebra import (
     stacked as stacked,
 )
 from jounce.jet.elementary import (
-    absolute as abs,  # noqa: A004 - the name that expressions use
+    absolute as _absolute,
     acos as acos,
     acosh as acosh,
     asin as asin,
@@ -45,4 +45,5 @@ from jounce.jet.vectors import (
 )
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
+abs = _absolute  # noqa: A001 - the name that expressions use
 _compute_under_own_settings(__name__)

@@ -26,16 +26,8 @@ from jounce.units.values import Value, parse_value, stated_dimensions
 
 GROUND = "ground"
 CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # other kinds contain constraints
-RESERVED_OUTPUTS = (  # axes of a result
-    "time",
-    "derivative",
-    "component",
-    "euler_parameter",
-    "euler_angle",
-    "row_axis",
-    "column_axis",
-    "parameter",
-)
+RESERVED_OUTPUTS = tuple("time derivative component euler_parameter euler_angle row_axis column_axis parameter".split())
+"""Axes of a result."""
 NEAREST = "nearest"
 SIDES = {"above": (-1, 1), "below": (-1, -1), "right": (0, 1), "left": (0, -1)}
 """Sides on which a body may be requested to lie: a component of the global frame, and its sign."""
@@ -188,8 +180,10 @@ class Mechanism(Displayed):
     def __post_init__(self):
         if self.space not in ("planar", "spatial"):
             raise MechanismError("space is planar or spatial", name="space", value=self.space)
-        if isinstance(self.bodies, Mapping) and isinstance(self.joints, Mapping):
-            object.__setattr__(self, "bodies", with_carriages(self.bodies, self.joints, Carriage))
+        for name in MAPPINGS:
+            if not isinstance(value := getattr(self, name), Mapping):
+                raise MechanismError("must be a dictionary, with a name for each entry", name=name, value=value)
+        object.__setattr__(self, "bodies", with_carriages(self.bodies, self.joints, Carriage))
         if not self.bodies:
             raise MechanismError("a mechanism needs at least one moving body", name="bodies", value=dict(self.bodies))
         self._check_names()
@@ -243,8 +237,9 @@ class Mechanism(Displayed):
             raise MechanismError("a joint and a driver have the same name", name=f"drivers.{name}")
         for kind in ("joints", "drivers"):
             for name in self.initial.keys() & getattr(self, kind).keys():
-                message = f"a {kind[:-1]} and an initial condition have the same name"
-                raise MechanismError(message, name=f"initial.{name}")
+                raise MechanismError(
+                    f"a {kind[:-1]} and an initial condition have the same name", name=f"initial.{name}"
+                )
 
     def _check_assembly(self) -> None:
         assembly = self.assembly
@@ -260,7 +255,8 @@ class Mechanism(Displayed):
         location = f"{kind}.{name}"
         expected = CLASSES.get(kind, AbstractConstraint)
         if not isinstance(element, expected):
-            raise MechanismError(f"must be one of the classes of {kind}", name=location, value=element)
+            classes = "drivers" if kind == "initial" else kind
+            raise MechanismError(f"must be one of the classes of {classes}", name=location, value=element)
         if kind == "initial" and element.role != "driver":
             message = "an initial condition is given by a driver"
             raise MechanismError(message, name=location, value=element.type_name or type(element).__name__)

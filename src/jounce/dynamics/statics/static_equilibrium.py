@@ -70,7 +70,8 @@ class Equilibrium(Displayed):
 
     def __repr__(self) -> str:
         title = f"{self.mechanism.title}: " if self.mechanism.title else ""
-        return f"<Equilibrium {title}{self.stability}, {self.degrees_of_freedom} degrees of freedom>"
+        noun = "degree of freedom" if self.degrees_of_freedom == 1 else "degrees of freedom"
+        return f"<Equilibrium {title}{self.stability}, {self.degrees_of_freedom} {noun}>"
 
     @property
     def degrees_of_freedom(self) -> int:

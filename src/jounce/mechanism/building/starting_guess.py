@@ -10,7 +10,7 @@ from jounce.constraints.cams import Cam
 from jounce.errors import JounceError, MechanismError
 from jounce.jet import Jet
 from jounce.mechanism.carriages import carriage_guess, curve_in, joint_of
-from jounce.mechanism.mechanism import GROUND, Carriage, Mechanism
+from jounce.mechanism.mechanism import GROUND, Body, Carriage, Mechanism
 from jounce.mechanism.resolve import along_instances, resolve, resolve_element, resolved
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
@@ -28,6 +28,7 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
             positions.append(_carriage_guess(mechanism, name, body, poses, parameters, components))
             attitudes.append(attitudes[0])
             continue
+        _check_unused(body, location, "orientation" if components == 2 else "angle")
         positions.append(resolved(body.position, f"{location}.position", "vector", components, parameters))
         if components == 2:
             attitudes.append(resolved(body.angle, f"{location}.angle", "scalar", components, parameters))
@@ -35,6 +36,14 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
             attitudes.append(_attitude(body.orientation, f"{location}.orientation", parameters))
     attitude = "angle" if components == 2 else "quaternion"
     return {"position": along_instances(*positions), attitude: along_instances(*attitudes)}
+
+
+def _check_unused(body: Body, location: str, unused: str) -> None:
+    """Raise MechanismError if a body states its attitude in the form of the other space, which would be ignored."""
+    value = getattr(body, unused)
+    if not (value is None or (type(value) in (int, float) and value == 0)):
+        needed = "an angle" if unused == "orientation" else "an orientation"
+        raise MechanismError(f"a body of this space has {needed} instead", name=f"{location}.{unused}", value=value)
 
 
 def _carriage_guess(

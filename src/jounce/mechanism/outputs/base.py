@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from jounce.base.modules import Module, field
+from jounce.base.modules import Module, Names, as_names, field
 from jounce.constraints.angles import relative_angle
 from jounce.constraints.base import Vector, check_bodies, check_words
 from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
@@ -83,7 +83,7 @@ class AbstractOutput(AbstractQuantity):
         Names of the bodies on which it depends, in the order of the poses that `evaluate` takes.
     """
 
-    bodies: tuple[str, ...] = field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
+    bodies: Names = field(static=True, metadata={"converter": as_names})
 
     turning: ClassVar[bool] = False  # an angle known up to whole turns, to be continued along the motion
     wraps: ClassVar[tuple[bool, ...]] = ()  # which components are angles in a range, to be continued along the motion

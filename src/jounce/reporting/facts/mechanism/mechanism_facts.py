@@ -21,7 +21,7 @@ from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, Model, ParameterOutput, build, time_grid, with_output_drivers
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.outputs.derivative_outputs import form_of
-from jounce.mechanism.resolve import resolve
+from jounce.mechanism.resolve import resolved
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.facts.mechanism.freedom_facts import AssemblyFacts, FreedomFacts, MobilityFacts, StartingState
@@ -151,7 +151,7 @@ def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = Non
         "kind": "mechanism",
         "title": mechanism.title,
         "space": mechanism.space,
-        "gravity": _numbers(mechanism, mechanism.gravity, POSITION_COMPONENTS[mechanism.space]),
+        "gravity": _gravity(mechanism),
         "parameters": parameter_facts(mechanism, path),
         **{kind: [_element(name, x) for name, x in getattr(mechanism, kind).items()] for kind in KINDS},
         "outputs": [_output(name, x) for name, x in mechanism.outputs.items()],
@@ -233,10 +233,11 @@ def grid_facts(instants: Float[np.ndarray, " time"]) -> dict[str, Any]:
     return facts | ({"remark": remark} if (remark := last_step_words(instants)) else {})
 
 
-def _numbers(mechanism: Mechanism, value: Any, size: int) -> list[float] | None:
-    if value is None:
+def _gravity(mechanism: Mechanism) -> list[float] | None:
+    if mechanism.gravity is None:
         return None
-    return np.reshape(np.asarray(resolve(value, mechanism.parameter_values), float), size).tolist()
+    size, values = POSITION_COMPONENTS[mechanism.space], mechanism.parameter_values
+    return resolved(mechanism.gravity, "gravity", "vector", size, values).tolist()
 
 
 def parameter_facts(mechanism: Mechanism, path: str | PathLike[str] | None) -> list[ParameterFacts]:
