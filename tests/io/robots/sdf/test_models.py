@@ -176,6 +176,22 @@ def test_joined_models_may_be_placed_by_one_that_is_not_joined(tmp_path, referen
         read(tmp_path, world(*models, joint("hinge", "a", "b")).replace(f'to="{reference}"', 'to="else"'))
 
 
+@pytest.mark.parametrize("placed", ["a frame of the world", "a nested frame"])
+def test_a_static_model_may_consist_of_frames(tmp_path, placed):
+    far, tip, near = "1 -0.5 0.2 0.4 -0.3 0.2", "0 0.3 0.1 0.2 0 0.5", "0.5 0 0.2 0.1 0.2 0.3"
+    marks = f'<model name="marks"><static>true</static><pose>{far}</pose><frame name="tip"><pose>{tip}</pose></frame>'
+    pose, inner = f'<pose relative_to="marks::tip">{near}</pose>', link("body") + joint("hinge", "world", "body")
+    if placed == "a nested frame":
+        inner = inner.replace('<link name="body">', f'<link name="body">{pose}')
+        text = world(f'<model name="arm">{marks}</model>{inner}</model>')
+    else:
+        text = world(f"{marks}</model>", f'<model name="arm">{pose}{inner}</model>')
+    motion = jn.forward_kinematics(read(tmp_path, text), [[0.0]], "body")
+    expected = matrix(far) @ matrix(tip) @ matrix(near)
+    np.testing.assert_allclose(motion.position[0], expected[:3, 3], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(motion.rotation[0], expected[:3, :3], rtol=0, atol=1e-14)
+
+
 def matrix(pose):
     numbers = [float(x) for x in pose.split()]
     found = np.eye(4)

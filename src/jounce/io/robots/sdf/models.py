@@ -169,8 +169,9 @@ def _joined(label: str, given: dict[str, _SourceModel], joints: WorldJoints, rea
     for name in (name for name in given if name in members):
         model = reader.flattened(given[name].model, given[name].version, top=True)
         root.children += scope(name, model)
-        if _static(model):
-            ends = {"parent": WORLD, "child": f"{name}::{Frames(model, named(model)).canonical_link()}"}
+        frames = Frames(model, named(model))
+        if _static(model) and frames.links:
+            ends = {"parent": WORLD, "child": f"{name}::{frames.canonical_link()}"}
             fixed = [made(model, tag, text) for tag, text in ends.items()]
             attributes = {"name": f"{name}::{WORLD}_fixed", "type": "fixed"}
             root.children.append(dataclasses.replace(model, tag="joint", attributes=attributes, children=fixed))

@@ -48,6 +48,7 @@ class Frames:
 
     def __init__(self, model: Element, elements: dict[str, Element]):
         self.model, self.elements = model, elements
+        self.links = [name for name, element in elements.items() if element.tag == "link"]
         self._resolved: dict[str, FramePose] = {MODEL: IDENTITY}
 
     def pose(self, name: str) -> FramePose:
@@ -83,10 +84,11 @@ class Frames:
 
     def canonical_link(self) -> str:
         """Return the canonical link of the model: the first one, unless it names another."""
-        links = [name for name, element in self.elements.items() if element.tag == "link"]
-        chosen = self.model.attributes.get("canonical_link") or links[0]
-        if chosen not in links:
-            raise self.model.error(no_such("link", chosen, links), "canonical_link", value=chosen)
+        if not self.links:
+            raise self.model.error("a robot needs at least one <link>")
+        chosen = self.model.attributes.get("canonical_link") or self.links[0]
+        if chosen not in self.links:
+            raise self.model.error(no_such("link", chosen, self.links), "canonical_link", value=chosen)
         return chosen
 
     def _extend(self, chain: list[str], name: str, element: Element) -> None:

@@ -116,7 +116,8 @@ class _Reader:
         joints = [joint for joint in every if joint.kind != "gearbox"]
         to_world = any(WORLD in (joint.parent, joint.child) for joint in joints)
         fixed = flag_of(self.model, "static", "static")
-        base = WORLD if to_world or fixed else self.frames.canonical_link()
+        canonical = self.frames.canonical_link()
+        base = WORLD if to_world or fixed else canonical
         tree, closing = self._divided(joints, base, [*inertias, *([WORLD] if base == WORLD else [])], fixed)
         self.links += [Link(WORLD)] if base == WORLD else []
         pulled = {name: flag_of(element, "gravity", "links", name, default=True) for name, element in elements.items()}

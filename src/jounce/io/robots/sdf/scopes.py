@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.io.robots.elements.xml_elements import Element
-from jounce.io.robots.sdf.poses import MODEL, WORLD, FramePose, Frames, pose_of
+from jounce.io.robots.sdf.poses import MODEL, WORLD, FramePose, Frames, flag_of, pose_of
 
 NAMED = ("link", "joint", "frame")
 REFERENCES = ("relative_to", "expressed_in", "attached_to")  # attributes that name a frame
@@ -31,8 +31,6 @@ def named(model: Element) -> dict[str, Element]:
                     continue
                 raise element.error("SDF reserves this name", f"{tag}s", value=name)
             elements[name] = element
-    if not any(element.tag == "link" for element in elements.values()):
-        raise model.error("a robot needs at least one <link>")
     return elements
 
 
@@ -85,7 +83,9 @@ def scoped(
         return frame if name == MODEL else name if merged else f"{scope}::{name}"
 
     pose, relative = placed
-    canonical = Frames(model, named(model)).canonical_link()
+    frames = Frames(model, named(model))
+    frames_alone = not frames.links and flag_of(model, "static", "static")
+    canonical = "" if frames_alone else frames.canonical_link()
     attached = made(location, "frame", name=frame, attached_to=rename(canonical))
     parts = [with_pose(attached, pose, relative or MODEL)]
     for child in model.children:
