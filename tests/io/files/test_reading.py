@@ -246,6 +246,10 @@ def test_meshes_that_are_shown(tmp_path):
     for mesh in ("part.obj", "package://here/part.obj", "package://there/part.obj", f"file://{tmp_path}/here/part.obj"):
         assert shown(mesh) == 1, mesh
     assert shown("../there/part.obj", allow=[tmp_path / "there"]) == 1
+    installed = tmp_path / "opt" / "share"
+    (installed / "parts" / "meshes").mkdir(parents=True)
+    (installed / "parts" / "meshes" / "part.obj").write_text(TETRAHEDRON)
+    assert [shown("package://parts/meshes/part.obj", allow=x) for x in ([], [installed])] == [0, 1]
     assert shown("none.obj") == 0
     for mesh in ("../there/part.obj", f"file://{tmp_path}/there/part.obj", "pipe.obj", "package://../../etc/passwd"):
         with pytest.warns(UserWarning, match="a mesh is not shown"):

@@ -163,7 +163,10 @@ def test_faults_of_tables_are_reported(tmp_path):
     with pytest.raises(jn.errors.TrajectoryError, match="line 3, time: must come after"):
         jn.load_trajectory(path)
     path.write_text("timestamp,target_q_0,actual_q_0\n0,1,x\n0.5,2,y\n")
-    assert jn.load_trajectory(path, joints=["a"]).derivatives([0.25], 0)[0, 0, 0] == 1.5
+    with pytest.warns(jn.errors.RecordingWarning, match=r"line 1: measured positions are left out \(actual_q_0 and"):
+        commanded = jn.load_trajectory(path, joints=["a"], as_controller=True)
+    assert commanded.derivatives([0.25], 0)[0, 0, 0] == 1.5
+    path.write_text("timestamp,target_q_0\n0,1\n0.5,2\n")
     with pytest.raises(jn.errors.TrajectoryError, match="as many different names"):
         jn.load_trajectory(path, joints=["a", "b"])
     path.write_text("time,elbow\n" + "".join(f"{k},{k}\n" for k in range(8)))

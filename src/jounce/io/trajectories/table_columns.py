@@ -27,7 +27,7 @@ WORDS = {
     **dict.fromkeys(("acceleration", "accelerations", "acc", "accel"), ACCELERATION),
     **dict.fromkeys(("effort", "efforts", "eff", "torque", "tau"), OTHER),
 }
-_NUMBERED = {
+NUMBERED = {
     POSITION: ("q", "position", "positions", "pos", "joint_positions", "actual_q"),
     VELOCITY: ("dq", "qd", "velocity", "velocities", "vel", "joint_velocities", "actual_qd"),
     ACCELERATION: ("ddq", "qdd", "acceleration", "accelerations", "acc"),
@@ -231,7 +231,7 @@ def _of_numbers(header: Sequence[str]) -> Columns | None:
         if match is None and column != time and name not in SPARE:
             return None
         word = match["word"].strip("/").rpartition("/")[2] if match else ""
-        level = next((level for level, words in _NUMBERED.items() if word in words), None)
+        level = next((level for level, words in NUMBERED.items() if word in words), None)
         if match is None or level is None:
             continue
         levels = columns.setdefault(int(match["number"]), {})

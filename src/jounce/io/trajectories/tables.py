@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import TrajectoryError
+from jounce.errors import RecordingWarning, TrajectoryError, warn_caller
 from jounce.io.files.reading import fault_of_number
 from jounce.io.files.samples import Table, check_named, rates
 from jounce.io.trajectories.agreement import check_agreement
@@ -15,6 +15,7 @@ from jounce.io.trajectories.controller_formats import ControllerFormat, format_o
 from jounce.io.trajectories.recordings import Recording
 from jounce.io.trajectories.stamps import NANO, epoch, in_sequence, relative
 from jounce.io.trajectories.table_columns import (
+    NUMBERED,
     POSITION,
     Columns,
     columns_of,
@@ -56,6 +57,11 @@ def read_recording(path: str, joints: Iterable[str] | None = None) -> Recording:
         table.find("time")  # raises an error if there is none
         raise table.error("there is no column besides 'time'; give one for each joint", line=line)
     recording = in_sequence(_recording(table, columns, points=controller is not None))
+    measured_names = [name for word in NUMBERED[POSITION] if (name := f"{word}_0") in table.header]
+    if controller and measured_names:
+        message = f"{path}, line {line}: measured positions are left out ({measured_names[0]} and the like)"
+        advice = f"to have them read, leave out the commanded ones, {controller.levels[0]}_0 and the like"
+        warn_caller(RecordingWarning(f"{message}; {advice}"))
     if joints is not None:
         if not recording.unnamed:
             message = "this file names its joints; give names for what controllers take only"

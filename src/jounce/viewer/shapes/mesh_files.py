@@ -57,12 +57,13 @@ class MeshFiles:
         return [(part, _color(part)) for part in meshes]
 
     def _file(self, name: str) -> str | None:
-        """Return the file of a mesh: relative to the robot file, or in the folder of its package above it."""
+        """Return the file of a mesh: relative to the robot file, or in its package, above that or in allowed folders."""
         scheme, _, rest = name.rpartition("://")
         if not rest:
             return None
         if scheme in ("package", "model"):
-            folders = self.path.resolve().parents[:-1]  # without the root of the file system
+            above = self.path.resolve().parents[:-1]  # without the root of the file system
+            folders = [*above, *(Path(folder).resolve() for folder in self.allow)]
             candidates = [(folder, inner) for folder in folders for inner in (rest, rest.partition("/")[2]) if inner]
             files = [named_file(inner, folder / "package.xml", error=RobotFileError) for folder, inner in candidates]
         else:
