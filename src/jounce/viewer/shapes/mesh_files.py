@@ -57,7 +57,7 @@ class MeshFiles:
         return [(part, _color(part)) for part in meshes]
 
     def _file(self, name: str) -> str | None:
-        """Return the file of a mesh: relative to the robot file, or in its package, above that or in allowed folders."""
+        """Return the file of a mesh: relative to the robot file, or in its package, above it or in allowed folders."""
         scheme, _, rest = name.rpartition("://")
         if not rest:
             return None
