@@ -8,13 +8,7 @@ from typing import Any
 from jounce.planning.smoothing.smooth import SmoothedTrajectory
 from jounce.reporting.text.tables import Table
 
-FOLLOWED = 3.0  # ratio of deviation to noise below which the motion follows noise
 SHOWN = 3  # largest number of dwells in the table
-
-
-def noisy_joints(motion: SmoothedTrajectory) -> list[str]:
-    """Return the joints whose noise is so large, relative to the deviation, that the motion follows it."""
-    return [name for name, joint in motion.joints.items() if motion.deviation < FOLLOWED * joint.noise]
 
 
 def smoothing_table(motion: SmoothedTrajectory) -> Table:
@@ -31,13 +25,6 @@ def smoothing_table(motion: SmoothedTrajectory) -> Table:
     ]
     heading = ("joint", "noise", "farthest", "followed below, Hz", "stands still, s")
     return Table("", heading, rows, numbers=(1, 2))
-
-
-def smoothing_words(motion: SmoothedTrajectory) -> str:
-    """Return what a smoothed motion does not say, and the joints whose motion follows noise."""
-    loud = noisy_joints(motion)
-    noise = f"\nThe deviation is below three times the noise of {', '.join(loud)}: the motion follows noise there."
-    return "\nDerivatives above the jerk, and second torque rates with them, are not known." + noise * bool(loud)
 
 
 def smoothing_result(
@@ -59,7 +46,7 @@ def smoothing_result(
             }
             for name, joint in motion.joints.items()
         ],
-        "follows_noise": noisy_joints(motion),
+        "follows_noise": motion.joints_that_follow_noise(),
         "written": written[0],
         "figure": written[1],
     }

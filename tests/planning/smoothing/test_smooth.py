@@ -9,7 +9,7 @@ from scipy.interpolate import PPoly
 
 import jounce as jn
 from jounce.errors import TrajectoryError
-from jounce.planning.smoothing import bases
+from jounce.planning.smoothing import bases, curves
 
 pytestmark = pytest.mark.long
 
@@ -191,9 +191,45 @@ def test_a_joint_that_rests_has_no_errors():
 def test_a_deviation_below_the_noise_is_kept_where_it_can_be():
     times = np.linspace(0, 3, 601)
     values = np.sin(2 * times) + 1e-4 * np.random.default_rng(2).normal(size=601)
-    _, law, own = law_of(times, values, 1.5e-4)
+    with pytest.warns(jn.errors.RecordingWarning, match=r"^a: the deviation of 0\.00015 is below three times .* follow the noise"):
+        motion, law, own = law_of(times, values, 1.5e-4)
+    assert motion.joints_that_follow_noise() == ["a"]
     assert np.abs(derivative(law, times, 0) - values).max() <= 1.5e-4
     assert 0.8e-4 < own.noise < 1.2e-4
+
+
+@pytest.mark.filterwarnings("ignore:a. the deviation")  # the noise of few samples is unsure
+@pytest.mark.parametrize("start, duration", [(0.2, 0.5), (1.1, 0.6)])
+def test_motions_of_few_samples_between_dwells_do_not_swing_between_them(start, duration):
+    times, instants = np.linspace(0, 2, 51), np.linspace(0, 2, 2001)
+    _, law, _ = law_of(times, np.round(minimum_jerk(times, start, duration, 1.5), 6), 2e-6)
+    errors = derivative(law, instants, 0) - minimum_jerk(instants, start, duration, 1.5)
+    assert np.abs(errors).max() < 5e-4
+
+
+def limited_jerk(times, start, duration, size, order):
+    jerk = 32 * size / duration**3
+    powers = [np.maximum(times - start - k * duration / 4, 0) ** (3 - order) for k in (0, 1, 3, 4)]
+    return jerk * np.array([1, -2, 2, -1]) @ powers / (6, 2, 1)[order]
+
+
+@pytest.mark.parametrize("start, duration", [(0.25, 1.5), (0.3, 1.45)])
+def test_samples_that_the_deviation_holds_everywhere_are_solved_for_together(start, duration):
+    times = np.linspace(0, 2, 2001)
+    samples = np.round(limited_jerk(times, start, duration, 0.7, 0), 8)
+    _, law, _ = law_of(times, samples, 8e-8)
+    accelerations = limited_jerk(times, start, duration, 0.7, 2)
+    np.testing.assert_allclose(derivative(law, times, 2), accelerations, rtol=0, atol=0.008 * accelerations.max())
+
+
+def test_a_deviation_near_rounding_is_kept():
+    times = np.linspace(0, 2, 1001)
+    _, law, own = law_of(times, 0.4 * np.exp(-12.5 * (times - 0.9) ** 2), 1e-12)
+    u = 25 * (times - 0.9)
+    jerk = 0.4 * np.exp(-12.5 * (times - 0.9) ** 2) * (75 * u - u**3)
+    inner = slice(30, -30)  # at the ends the spline has no jounce
+    assert own.away <= 1e-12
+    np.testing.assert_allclose(derivative(law, times, 3)[inner], jerk[inner], rtol=0, atol=1e-3 * np.abs(jerk).max())
 
 
 def test_uneven_stamps_and_all_derivatives_are_continuous():
@@ -228,6 +264,14 @@ def test_moves_that_begin_slowly_are_no_dwells(seed, noise):
     assert 0.75 < found.max() / np.abs(jerk).max() < 1.25
 
 
+def test_a_short_move_there_and_back_is_no_part_of_the_dwells_beside_it():
+    times, instants = np.linspace(0, 2, 101), np.linspace(0, 2, 2001)
+    samples, truth = (0.55 * np.exp(-(((t - 1.23) / 0.07) ** 2)) for t in (times, instants))
+    _, law, own = law_of(times, np.round(samples, 5), 2e-5)
+    assert len(own.dwells) == 2
+    assert np.abs(derivative(law, instants, 0) - truth).max() < 1e-3
+
+
 def test_long_logs_are_smoothed_part_by_part_as_they_are_whole(monkeypatch):
     times = np.arange(0.0, 8.0, 2e-3)
     values = np.sin(times) + 1e-5 * np.random.default_rng(6).normal(size=len(times))
@@ -236,6 +280,19 @@ def test_long_logs_are_smoothed_part_by_part_as_they_are_whole(monkeypatch):
     _, parts, own = law_of(times, values, 3.5e-5)
     assert own.away <= 3.5e-5
     np.testing.assert_allclose(derivative(parts, times, 2), derivative(whole, times, 2), rtol=0, atol=1e-6)  # of 1
+
+
+@pytest.mark.filterwarnings("ignore:a. the deviation")
+def test_many_splines_are_moved_part_by_part_as_they_are_together(monkeypatch):
+    times = np.linspace(0, 4, 2001)
+    values = np.sin(5 * times) + 0.1 * np.sin(31 * times) + 1e-5 * np.random.default_rng(0).normal(size=len(times))
+    _, together, _ = law_of(times, values, 1.5e-5)
+    monkeypatch.setattr(curves, "TOGETHER", 100)
+    monkeypatch.setattr(curves, "AHEAD", 100)
+    _, parts, own = law_of(times, values, 1.5e-5)
+    jerk = derivative(together, times, 3)
+    assert own.away <= 1.5e-5
+    np.testing.assert_allclose(derivative(parts, times, 3), jerk, rtol=0, atol=1e-3 * np.abs(jerk).max())
 
 
 def test_what_is_refused_is_named():

@@ -60,7 +60,7 @@ def smooth(
     """
     from jounce.mechanism import TimeGrid, time_grid
     from jounce.planning import smooth as find
-    from jounce.reporting.smoothing_facts import smoothing_result, smoothing_table, smoothing_words
+    from jounce.reporting.smoothing_facts import smoothing_result, smoothing_table
     from jounce.units.instants import interval_text
 
     output.check()
@@ -85,7 +85,7 @@ def smooth(
             f"{rows}from {interval_text(motion.start, motion.stop)}, within {allowed:.3g} rad or m of each sample"
         )
         show_table(smoothing_table(motion))
-        print_text(smoothing_words(motion))
+        print_text("\nDerivatives above the jerk, and second torque rates with them, are not known.")
     if output.out is not None:
         output.write_parts(_parts(model, motion, times), len(times))
     if figure is not None:

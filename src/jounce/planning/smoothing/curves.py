@@ -20,12 +20,13 @@ from jounce.units.instants import time_text
 CELL = np.pi / 4  # length of a cell times the cutoff frequency
 GRADED = 1.6  # ratio of the lengths of neighboring cells
 FEWEST = 8  # cells between two dwells
-INSIDE = 1 - 1e-6  # fraction of the deviation that allows for the tolerance of the solver
+MARGIN = 1e-6  # fraction of the deviation: tolerance of the solver
+ROUNDING = 32 * np.finfo(float).eps  # of the value of a spline, relative to its largest coefficient
 ROUNDS, HALVINGS = 12, 12
 LOOKS = 8  # evaluations of the knot density in an interval
 HALVED = 3  # cells on each side of one that is halved
 PADDING = 24  # neighboring splines that move with those at samples that are too far
-TOGETHER = 400  # approximate number of splines that are solved for at once
+TOGETHER, AHEAD = 2000, 400  # splines that are solved for at once, and splines after them that are solved for again
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -101,7 +102,7 @@ def laid_knots(
             grids.append(np.array([a]))
             continue
         grid = np.linspace(a, b, 2 + int((b - a) / max(sample_step, min_step)))
-        length = np.maximum(np.exp(np.interp(grid, middles, logarithms)), sample_step)
+        length = np.maximum(np.exp(np.interp(grid, middles, logarithms)), sample_step / 2)
         count = np.append(0.0, np.cumsum(np.diff(grid) * 2 / (length[1:] + length[:-1])))
         samples = int(np.searchsorted(times, b) - np.searchsorted(times, a))
         cells = max(min(FEWEST, samples), int(np.ceil(count[-1])), 1)
@@ -188,8 +189,10 @@ class _Problem:
                 raise TooFarError(missed)
             for run in _runs(is_moved):
                 for chunk in _parts(run):
-                    self._move(coefficients, chunk)
-        raise TooFarError(self._far(coefficients))
+                    self._move(coefficients, chunk, run.stop)
+        if len(missed := self._far(coefficients)):
+            raise TooFarError(missed)
+        return coefficients
 
     def _cells(self, samples: Int[np.ndarray, " some"]) -> Int[np.ndarray, " some"]:
         """Return the cells of samples, whose numbers are also those of the first nonzero splines at the samples."""
@@ -207,23 +210,26 @@ class _Problem:
             missed.append(chunk.start + np.flatnonzero(distances > self.deviation))
         return np.concatenate(missed)
 
-    def _move(self, coefficients: np.ndarray, run: slice) -> None:
-        """Solve for a run of coefficients such that all samples under its splines are within the deviation."""
+    def _move(self, coefficients: np.ndarray, run: slice, last: int) -> None:
+        """Change a run of coefficients such that all samples under its splines are within the deviation.
+
+        If the run goes on to another ``last``, samples under splines beyond it do not count: those are not moved yet.
+        """
         from scipy import sparse
 
         clarabel = cone_solver()
         knots = self.samples.knots
-        ends = knots[[max(run.start - DEGREE, 0), min(run.stop, len(knots) - 1)]]
-        side = "right" if run.stop >= len(knots) - 1 else "left"
+        stop = run.stop if run.stop == last else run.stop - DEGREE
+        ends = knots[[max(run.start - DEGREE, 0), min(stop, len(knots) - 1)]]
+        side = "right" if stop >= len(knots) - 1 else "left"
         rows = np.arange(self.samples.place(ends[0]), self.samples.place(ends[1], side))
         matrix = values_at(self.samples.times(rows), knots)
-        others = coefficients.copy()
-        others[run] = 0.0
         columns = matrix[:, run]
-        residual = self.samples.values(rows) - matrix @ others
-        target = self.right[run] - self.system[run] @ others
+        residual = self.samples.values(rows) - matrix @ coefficients
+        target = self.right[run] - self.system[run] @ coefficients
         size = self.deviation
-        bounds = np.concatenate([residual / size + INSIDE, INSIDE - residual / size])
+        inside = 1 - MARGIN - ROUNDING * float(np.abs(coefficients).max()) / size
+        bounds = np.concatenate([inside + residual / size, inside - residual / size])
         quadratic = sparse.triu(self.system[run, run], format="csc")
         top = float(quadratic.diagonal().max())
         settings = clarabel.DefaultSettings()
@@ -238,15 +244,12 @@ class _Problem:
         )
         solution = solver.solve()
         if "Solved" not in str(solution.status):
-            missed = rows[np.abs(columns @ coefficients[run] - residual) > self.deviation]
+            missed = rows[np.abs(residual) > self.deviation]
             raise TooFarError(missed if len(missed) else rows[:1])
-        coefficients[run] = np.array(solution.x) * size
+        coefficients[run] += np.array(solution.x) * size
 
 
 def _parts(run: slice) -> list[slice]:
     """Return overlapping parts of a long run."""
-    count = run.stop - run.start
-    if count <= 2 * TOGETHER:
-        return [run]
-    firsts = range(run.start, run.stop - TOGETHER, TOGETHER)
-    return [slice(k, min(k + TOGETHER + 4 * DEGREE, run.stop) if k != firsts[-1] else run.stop) for k in firsts]
+    starts = range(run.start, max(run.stop - AHEAD, run.start + 1), TOGETHER)
+    return [slice(k, min(k + TOGETHER + AHEAD, run.stop)) for k in starts]

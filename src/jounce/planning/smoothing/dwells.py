@@ -110,17 +110,20 @@ def without_margins(
 
 
 def _joined(dwells: list[Dwell], values: np.ndarray, sigma: float) -> list[Dwell]:
-    """Return dwells with those joined that rest at one position a short time apart."""
-    result: list[Dwell] = []
-    for dwell in dwells:
-        if result and dwell.first - result[-1].last <= NEAR * BLOCK:
-            previous = result[-1]
-            counts = previous.last - previous.first + 1, dwell.last - dwell.first + 1
-            if abs(previous.position - dwell.position) <= SURE * sigma * np.sqrt(1 / counts[0] + 1 / counts[1]):
-                samples = values[previous.first : dwell.last + 1]
-                result[-1] = Dwell(previous.first, dwell.last, float(samples.mean()))
-                continue
-        result.append(dwell)
+    """Return dwells with those joined that rest at one position a short time apart, with rest between them."""
+    result = dwells[:1]
+    for dwell in dwells[1:]:
+        previous = result[-1]
+        counts = previous.last - previous.first + 1, dwell.last - dwell.first + 1
+        if (
+            dwell.first - previous.last <= NEAR * BLOCK
+            and abs(previous.position - dwell.position) <= SURE * sigma * np.sqrt(1 / counts[0] + 1 / counts[1])
+            and np.ptp(values[previous.last : dwell.first + 1]) <= 2 * SURE * sigma
+        ):
+            samples = values[previous.first : dwell.last + 1]
+            result[-1] = Dwell(previous.first, dwell.last, float(samples.mean()))
+        else:
+            result.append(dwell)
     return result
 
 

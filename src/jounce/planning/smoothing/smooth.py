@@ -34,6 +34,8 @@ CATCHES_UP = 0.6  # least ratio of a step after repeated samples to the next ste
 SAME = 1e-9  # fraction of the range: smaller differences are rounding of a conversion of units
 REPEATED = 0.05  # fraction of the samples: fewer repeated samples may be chance
 LONG = 5  # repeated samples that are not chance if the step after them is long
+FOLLOWED = 3.0  # ratio of the deviation to the noise below which the motion follows noise
+REACHED = 0.999  # fraction of the deviation: a motion as far from a sample is held by the deviation
 UNSEEN = 3.0  # time in which a motion may start or end unseen, times the cutoff frequency
 
 
@@ -94,6 +96,15 @@ class SmoothedTrajectory(JointTrajectory):
         state = (self.laws.given(), self.start, self.stop, self.times, dict(self.measures), self.deviation, self.joints)
         return type(self), state
 
+    def joints_that_follow_noise(self) -> list[str]:
+        """Return the joints whose motion the deviation holds closer to the samples than three times their noise."""
+        limit = REACHED * self.deviation
+        return [
+            name
+            for name, joint in self.joints.items()
+            if self.deviation < FOLLOWED * joint.noise and joint.away > limit
+        ]
+
 
 def smooth(trajectory: JointTrajectory | Refused, deviation: float) -> SmoothedTrajectory:
     """Return a smooth motion within a deviation of the samples of a trajectory.
@@ -125,8 +136,8 @@ def smooth(trajectory: JointTrajectory | Refused, deviation: float) -> SmoothedT
     Warns
     -----
     RecordingWarning
-        If a sample is far from its neighbors, so that the motion moves to it and back, or samples repeat the one before
-        while the joint moves.
+        If a sample is far from its neighbors, so that the motion moves to it and back, samples repeat the one before
+        while the joint moves, or the deviation is so small that the motion follows noise.
 
     Examples
     --------
@@ -154,9 +165,19 @@ def smooth(trajectory: JointTrajectory | Refused, deviation: float) -> SmoothedT
             laws[name], joints[name] = smoothed_samples(times, np.ascontiguousarray(values), deviation)
         except (SolveError, TrajectoryError) as error:
             raise TrajectoryError(error.message, name=name, value=error.value) from None
-    return SmoothedTrajectory(
+    motion = SmoothedTrajectory(
         laws, trajectory.start, trajectory.stop, trajectory.times, trajectory.measures, deviation, joints
     )
+    if noisy := motion.joints_that_follow_noise():
+        name = max(noisy, key=lambda joint: joints[joint].noise)
+        noise = joints[name].noise
+        message = (
+            f"{', '.join(noisy)}: the deviation of {deviation:.3g} is below three times the noise, {noise:.3g}"
+            f"{f' in {name}' if len(noisy) > 1 else ''}, so that the motion and its derivatives follow the noise; "
+            f"allow {FOLLOWED * noise:.2g}"
+        )
+        warn_caller(RecordingWarning(message))
+    return motion
 
 
 def _doubt(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float) -> str:
