@@ -46,7 +46,7 @@ def smoothing_result(
             }
             for name, joint in motion.joints.items()
         ],
-        "follows_noise": motion.joints_that_follow_noise(),
+        "follows_noise": [name for name, joint in motion.joints.items() if joint.follows_noise(motion.deviation)],
         "written": written[0],
         "figure": written[1],
     }

@@ -65,6 +65,10 @@ class SmoothedJoint:
     cutoff: tuple[float, float]
     standard_errors: tuple[float, ...]
 
+    def follows_noise(self, deviation: float) -> bool:
+        """Return whether a deviation, rad or m, holds the motion closer to its samples than three times their noise."""
+        return bool(deviation < FOLLOWED * self.noise and self.away > REACHED * deviation)
+
 
 class SmoothedTrajectory(JointTrajectory):
     """A trajectory within a deviation of samples.
@@ -95,15 +99,6 @@ class SmoothedTrajectory(JointTrajectory):
     def __reduce__(self) -> tuple[object, ...]:
         state = (self.laws.given(), self.start, self.stop, self.times, dict(self.measures), self.deviation, self.joints)
         return type(self), state
-
-    def joints_that_follow_noise(self) -> list[str]:
-        """Return the joints whose motion the deviation holds closer to the samples than three times their noise."""
-        limit = REACHED * self.deviation
-        return [
-            name
-            for name, joint in self.joints.items()
-            if self.deviation < FOLLOWED * joint.noise and joint.away > limit
-        ]
 
 
 def smooth(trajectory: JointTrajectory | Refused, deviation: float) -> SmoothedTrajectory:
@@ -162,22 +157,20 @@ def smooth(trajectory: JointTrajectory | Refused, deviation: float) -> SmoothedT
         try:
             if doubt := _doubt(times, np.asarray(values), deviation):
                 warn_caller(RecordingWarning(f"{name}: {doubt}"))
-            laws[name], joints[name] = smoothed_samples(times, np.ascontiguousarray(values), deviation)
+            laws[name], joint = smoothed_samples(times, np.ascontiguousarray(values), deviation)
         except (SolveError, TrajectoryError) as error:
             raise TrajectoryError(error.message, name=name, value=error.value) from None
-    motion = SmoothedTrajectory(
+        joints[name] = joint
+        if not doubt and joint.follows_noise(deviation):
+            message = (
+                f"{name}: the deviation of {deviation:.3g} is below three times the noise of the samples, "
+                f"{joint.noise:.3g}, so that the motion and its derivatives follow the noise; "
+                f"allow {FOLLOWED * joint.noise:.2g}"
+            )
+            warn_caller(RecordingWarning(message))
+    return SmoothedTrajectory(
         laws, trajectory.start, trajectory.stop, trajectory.times, trajectory.measures, deviation, joints
     )
-    if noisy := motion.joints_that_follow_noise():
-        name = max(noisy, key=lambda joint: joints[joint].noise)
-        noise = joints[name].noise
-        message = (
-            f"{', '.join(noisy)}: the deviation of {deviation:.3g} is below three times the noise, {noise:.3g}"
-            f"{f' in {name}' if len(noisy) > 1 else ''}, so that the motion and its derivatives follow the noise; "
-            f"allow {FOLLOWED * noise:.2g}"
-        )
-        warn_caller(RecordingWarning(message))
-    return motion
 
 
 def _doubt(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float) -> str:
