@@ -128,6 +128,7 @@ def unsupported_words(name: str, order: int, error: float, law: Any, by: str = "
     size = "cannot be known from them" if error >= 1 else f"is about {100 * error:.0f} %"
     with_rates, is_smoothed = law.joined < law.degree - 1, law.samples.value is None
     if is_smoothed:
+        size = size if error >= 1 else f"{size}, and nothing is known above the jerk"
         cause = "sample more exactly, request a lower order, or give an expression or a profile of the motion"
     elif order >= law.degree:
         remedy = "leave out the rates beside them" if with_rates else "choose a higher degree"
