@@ -312,7 +312,7 @@ class JointTrajectory(Displayed):
         The error of interpolation is estimated from splines through every second sample. Three standard deviations of
         the noise of the samples (including rounding and quantization), as amplified by the splines, are added. The
         estimate is conservative: 1 to 10 times the true error for the degrees 3 and 5, up to 30 times for 7, measured
-        on sines and Gaussians. For smoothed samples it is three standard errors up to the jerk, and unknown above.
+        on sines and Gaussians. For smoothed samples, errors above the jerk are unknown.
 
         Parameters
         ----------

@@ -184,6 +184,20 @@ def test_estimated_errors_are_those_of_the_motion(noise, supported):
     assert errors[4] > 0.5
 
 
+def test_a_motion_that_follows_noise_says_so():
+    """With a deviation of twice the noise the acceleration is off by half of its peak, the jerk by 27 peaks."""
+    times, rate = np.arange(0, 3 + 1e-9, 2e-3), 2 * np.pi
+    sine = np.stack([0.5 * rate**k * np.sin(rate * times + 0.4 + k * np.pi / 2) for k in range(4)])
+    values = sine[0] + 1e-4 * np.random.default_rng(1).normal(size=len(times))
+    motion, law, found = law_of(times, values, 2e-4)
+    followed = np.stack([derivative(law, times, k) for k in range(4)])
+    peaks = np.abs(followed).max(axis=1)
+    true = np.quantile(np.abs(followed - sine), 0.99, axis=1) / peaks
+    assert (true < motion.estimate_error(3)[:, 0]).all()
+    assert true[3] > 0.1 > 0.02 > 3 * found.standard_errors[3] / peaks[3]
+    assert motion.supported_order() == 1
+
+
 def test_a_joint_that_rests_has_no_errors():
     noisy = 1e-4 * np.random.default_rng(1).normal(size=201)
     motion, _, _ = law_of(np.linspace(0, 1, 201), noisy, 1e-3)

@@ -41,11 +41,14 @@ class Curve:
         Coefficients, rad or m.
     away : float
         Largest distance of the spline from a sample.
+    forced : array of shape (spline,)
+        What the deviation changed of the coefficients: the part of the motion that follows noise.
     """
 
     knots: Float[np.ndarray, " knot"]
     coefficients: Float[np.ndarray, " spline"]
     away: float
+    forced: Float[np.ndarray, " spline"]
 
 
 class TooFarError(Exception):
@@ -144,7 +147,9 @@ def _on_knots(
     for run in _runs(is_free):
         coefficients[run] = _solved(system, right, coefficients, run)
     problem = _Problem(samples, system, right, deviation)
-    return Curve(knots, problem.within(coefficients, is_free) + samples.middle, problem.away)
+    likely = coefficients.copy()
+    coefficients = problem.within(coefficients, is_free)
+    return Curve(knots, coefficients + samples.middle, problem.away, coefficients - likely)
 
 
 def _runs(chosen: Bool[np.ndarray, " spline"]) -> list[slice]:

@@ -56,7 +56,8 @@ class SmoothedJoint:
     standard_errors : tuple of float
         Standard deviations of position, velocity, acceleration and jerk that follow from the noise, in SI units, where
         the motion is fastest. Higher derivatives have none: of the jounce only its integral is known. At the first and
-        the last sample of a log that does not rest there, they are 2.7, 6.7, 6.8 and 2.8 times as large.
+        the last sample of a log that does not rest there, they are 2.7, 6.7, 6.8 and 2.8 times as large. They do not
+        contain what a deviation below three times the noise makes the motion follow; `estimate_error` does.
     """
 
     noise: float
@@ -297,7 +298,9 @@ def smoothed_samples(
         is_resting = (curve.knots[:-1] >= times[dwell.first]) & (curve.knots[:-1] < times[dwell.last])
         powers[0, is_resting], powers[1:, is_resting] = dwell.position, 0.0
     errors = np.max([estimate.standard_errors for estimate in estimates], axis=0)
-    law = SmoothPieces(curve.knots[:-1], powers, float(curve.knots[-1]), _relative(errors, powers, times))
+    forced = BSpline(spline.t, curve.forced, DEGREE)
+    largest = [NOISE_SAFETY * x + float(np.abs(forced(curve.knots, nu=k)).max()) for k, x in enumerate(errors)]
+    law = SmoothPieces(curve.knots[:-1], powers, float(curve.knots[-1]), _relative(largest, powers, times))
     intervals = tuple((float(times[d.first]), float(times[d.last])) for d in rests)
     rates = [estimate.cutoff / (2 * np.pi) for estimate in estimates]
     noise = max(sigma, float(np.median([estimate.noise for estimate in estimates])))
@@ -305,13 +308,13 @@ def smoothed_samples(
 
 
 def _relative(
-    errors: Float[np.ndarray, " known"], powers: Float[np.ndarray, "power piece"], times: Float[np.ndarray, " sample"]
+    errors: list[float], powers: Float[np.ndarray, "power piece"], times: Float[np.ndarray, " sample"]
 ) -> Float[np.ndarray, " derivative"]:
-    """Return three standard errors of the derivatives relative to their peaks; 1 for those that have none."""
+    """Return the largest errors of the derivatives relative to their peaks; 1 for those whose error is not known."""
     if not powers[1:].any():  # it rests
         return np.zeros(len(powers))
     peaks = np.array([math.factorial(k) * max(row.max(), -row.min()) for k, row in enumerate(powers)])
-    whole_errors = np.append(NOISE_SAFETY * errors, np.full(len(powers) - len(errors), np.inf))
+    whole_errors = np.append(errors, np.full(len(powers) - len(errors), np.inf))
     return relative_errors(whole_errors, peaks, float(np.ptp(powers[0])), float(times[-1] - times[0]))
 
 
