@@ -24,7 +24,15 @@ def arm():
     return jn.Robot("arm", links, joints)
 
 
+LAWS = {n: f"({x!r}) + ({v!r})*t + ({a!r})*t**2/2" for n, (x, v, a) in zip(NAMES, Q.T.tolist(), strict=True)}
+
+
+def of_trajectory(order):
+    return jn.JointTrajectory({name: LAWS[name] for name in order}, 0.0, 1.0).derivatives([0.0], 2)
+
+
 ORDERED = {
+    "trajectory": lambda order: of_trajectory(order)[0],
     "table": lambda order: pandas.DataFrame(Q, columns=NAMES)[list(order)],
     "array": lambda order: xarray.DataArray(Q, dims=("derivative", "joint"), coords={"joint": [*NAMES]}).sel(
         joint=list(order)
@@ -43,6 +51,30 @@ def test_coordinates_are_in_the_order_of_the_robot_whatever_the_order_of_labels(
     state, force = q[:2], q[2:]
     np.testing.assert_array_equal(jn.bias_forces(arm, state), jn.bias_forces(arm, Q[:2]))
     np.testing.assert_array_equal(jn.forward_dynamics(arm, state, force), jn.forward_dynamics(arm, Q[:2], Q[2:]))
+
+
+def test_parts_of_the_values_of_a_trajectory_keep_their_joints(arm):
+    q = of_trajectory("CAB")
+    expected = jn.mass_matrix(arm, Q[:1])
+    for part in (q[:, 0], q[0, :1], q[0][0][None], q[-1:, np.int64(0)], q[..., :1, :], q[[True], 0], q[:, 0, ::-1]):
+        np.testing.assert_array_equal(jn.mass_matrix(arm, part), expected.reshape(*part.shape[:-1], 3, 3))
+    by_hand = (q[..., [1, 2, 0]], q[:, :, [1, 2, 0]], np.asarray(q)[:, :, [1, 2, 0]], (2 * q[..., [1, 2, 0]]) / 2)
+    for ordered in by_hand:
+        np.testing.assert_array_equal(jn.inverse_dynamics(arm, ordered)[0], jn.inverse_dynamics(arm, Q))
+    assert [type(x) for x in (2 * q, abs(q), q.max(), q.sum(axis=0))] == [
+        np.ndarray,
+        np.ndarray,
+        np.float64,
+        np.ndarray,
+    ]
+
+
+def test_values_of_joints_some_of_which_the_robot_lacks_are_refused(arm):
+    laws = {"D": "t", "B": "t", "C": "t"}
+    with pytest.raises(JounceError, match=r"q: its last axis must have each of the joints A, B, C once.*got 'D, B, C'"):
+        jn.inverse_dynamics(arm, jn.JointTrajectory(laws, 0.0, 1.0).derivatives([0.0], 2))
+    others = jn.JointTrajectory({"x": LAWS["A"], "y": LAWS["B"], "z": LAWS["C"]}, 0.0, 1.0).derivatives([0.0], 2)
+    np.testing.assert_array_equal(jn.inverse_dynamics(arm, others)[0], jn.inverse_dynamics(arm, Q))
 
 
 def test_columns_of_samples_and_waypoints_are_in_the_order_of_the_names():

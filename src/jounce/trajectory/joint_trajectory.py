@@ -22,7 +22,7 @@ from jounce.trajectory.checks import (
     positive,
     whole_number,
 )
-from jounce.trajectory.labels import in_order
+from jounce.trajectory.labels import JointValues, in_order
 from jounce.trajectory.laws.profiles import motion_profile
 from jounce.trajectory.laws.stacking import evaluate_laws, law_derivatives
 from jounce.trajectory.laws.trapezoid import LIMITS
@@ -282,7 +282,7 @@ class JointTrajectory(Displayed):
         Returns
         -------
         ndarray of shape (time, order + 1, joints)
-            Plain derivatives, m or rad per s to the power of their order.
+            Plain derivatives, m or rad per s to the power of their order. Functions of robots assign them by joint.
 
         Raises
         ------
@@ -299,7 +299,7 @@ class JointTrajectory(Displayed):
         instants = self._inside(finite_row("times", times, seconds))
         self._warn(order, chosen)
         derivatives = law_derivatives([self.laws[name] for name in chosen], instants, order)
-        result = np.ascontiguousarray(np.moveaxis(derivatives, -1, 0))
+        result = JointValues.of(chosen, np.moveaxis(derivatives, -1, 0))
         if len(failures := np.argwhere(~np.isfinite(result))):
             sample, derivative, joint = failures[0]
             phrase = f"at {instants[sample]:.9g} s: derivative {derivative} is no number"

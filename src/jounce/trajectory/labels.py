@@ -1,4 +1,7 @@
-"""Labels of xarray and pandas arrays, so that values are assigned to joints by name instead of position."""
+"""Labels of xarray and pandas arrays, so that values are assigned to joints by name instead of position.
+
+Values of a trajectory have such labels, too: messages of ROS often have the joints in another order than the robot.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,30 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
+
+
+class JointValues(np.ndarray):
+    """An array that knows the joints along its last axis, as do its parts."""
+
+    joint_names: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, joint_names: Iterable[str], values: np.ndarray) -> JointValues:
+        """Return values, the last axis of which has these joints."""
+        named = np.ascontiguousarray(values).view(cls)
+        named.joint_names = tuple(joint_names)
+        return named
+
+    def __getitem__(self, key: Any) -> Any:
+        part = super().__getitem__(key)
+        if isinstance(part, JointValues) and self.joint_names and part.size and part.ndim:
+            columns = np.broadcast_to(np.arange(self.shape[-1]), self.shape)[key]
+            row = columns[(0,) * (columns.ndim - 1)].tolist()
+            part.joint_names = tuple(self.joint_names[k] for k in row) if len({*row}) == len(row) else ()
+        return part
+
+    def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
+        return array[()] if return_scalar else np.asarray(array)
 
 
 def in_order(
@@ -31,6 +58,8 @@ def in_order(
         is_transposed = "joint" in values.dims[:-1]
     elif hasattr(values, "iloc") and hasattr(values, "axes"):
         axes, is_transposed = [_texts(axis) for axis in values.axes], False
+    elif isinstance(values, JointValues):
+        axes, is_transposed, values = [list(values.joint_names)], False, np.asarray(values)
     else:
         return values
     last_labels, expected = (axes[-1] if axes else []), set(labels)
@@ -43,7 +72,9 @@ def in_order(
         message = f"its last axis must have each of the {plural} {', '.join(labels)} once, and nothing else"
         raise error(message, name=name, value=", ".join(last_labels))
     order = [last_labels.index(label) for label in labels]
-    return values.isel({values.dims[-1]: order}) if hasattr(values, "isel") else values.iloc[..., order]
+    if hasattr(values, "isel"):
+        return values.isel({values.dims[-1]: order})
+    return values[..., order] if isinstance(values, np.ndarray) else values.iloc[..., order]
 
 
 def _check_derivatives(name: str, values: Any, error: Callable[..., Exception]) -> None:
