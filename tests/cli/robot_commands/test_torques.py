@@ -83,6 +83,20 @@ def test_json(run, files):
     assert first["maximum"] == pytest.approx(closed_form(np.array([first["maximum_at"]]))[0, 0], rel=1e-12)
 
 
+def test_peaks_between_few_instants_are_found(run, files):
+    """The torque is least at a quarter period, and its rate at the start; the instants are 0, 0.5 and 1 s."""
+    files[1].write_text(LAW.replace("0.1", "0.5"))
+    status, printed, _ = run(*files, "--json", "--rates", 1)
+    torque, rate = json.loads(printed)["peaks"]
+    least = MASS * GRAVITY * ARM * np.cos(0.5) - 2 * INERTIA
+    assert status == 0
+    assert torque["minimum"] == pytest.approx(least, rel=1e-6)
+    assert torque["minimum_at"] == pytest.approx(np.pi / 4, abs=1e-3)
+    dense = closed_form(np.linspace(0.0, 1.0, 100_001))
+    assert [rate["minimum"], rate["maximum"]] == pytest.approx([dense[:, 1].min(), dense[:, 1].max()], abs=1e-5)
+    assert "t = 0 s to 1 s, 3 instants and the peaks between them\n" in run(*files)[1]
+
+
 @pytest.mark.parametrize(
     "change, words",
     [

@@ -121,8 +121,8 @@ def torques(
 ) -> int:
     r"""Compute the joint torques of a trajectory, and their rates.
 
-    The command prints the peaks at the instants of the trajectory and
-    on both sides of jumps and kinks of its laws.
+    The command prints the peaks at the instants of the trajectory, at
+    2000 or more in total, and on both sides of jumps and kinks.
 
     Parameters
     ----------
@@ -160,8 +160,8 @@ def torques(
     with errors_about(trajectory, robot):
         dataset = trajectory_torques(model, motion, rates, drives=not no_drives, loads=loads)
         ends = trajectory_ends(model, motion)
-        one_sided = _torques_at_breaks(model, motion, rates, loads, drives=not no_drives)
-    largest = table_peaks(dataset, one_sided)
+        between = _torques_between(model, motion, rates, loads, drives=not no_drives)
+    largest = table_peaks(dataset, between)
     if not output.json:
         print_text(
             "\n".join([torques_summary(dataset, motion, ends, robot, trajectory), *(load.words for load in loads)])
@@ -172,10 +172,11 @@ def torques(
     return 0
 
 
-def _torques_at_breaks(robot: Any, motion: Any, rates: int, loads: Any, *, drives: bool) -> Any:
-    """Return the torques on both sides of breaks of laws and load changes; None if there are none."""
+def _torques_between(robot: Any, motion: Any, rates: int, loads: Any, *, drives: bool) -> Any:
+    """Return the torques between the instants of a motion: at both sides of breaks, and densely if there are few."""
     import numpy as np
 
+    from jounce.dynamics.limits.check_limits import fine_grid
     from jounce.dynamics.limits.trajectories import trajectory_torques
     from jounce.robot.algorithms.carried_loads import LoadedRobot
     from jounce.trajectory.law_checks.breaks import both_sides, distinct_instants, law_breaks
@@ -185,12 +186,15 @@ def _torques_at_breaks(robot: Any, motion: Any, rates: int, loads: Any, *, drive
     changes = LoadedRobot(robot, loads, motion.start, motion.stop).changes
     breaks = distinct_instants(np.append(breaks, changes), first, last)
     sides, indices = both_sides(breaks, first, last)
-    if not len(sides):
+    grid = np.setdiff1d(fine_grid(motion, least=1), motion.times)
+    grid = grid[(grid > first) & (grid < last)]
+    times = np.concatenate([sides, grid])
+    if not len(times):
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)  # the message covers all instants
-        torques_there = trajectory_torques(robot, motion, rates, times=sides, drives=drives, loads=loads)
-    return torques_there.assign_coords(time=breaks[indices])
+        torques_there = trajectory_torques(robot, motion, rates, times=times, drives=drives, loads=loads)
+    return torques_there.assign_coords(time=np.concatenate([breaks[indices], grid]))
 
 
 def _smoothed(motion: Any, robot: Any, deviation: str | None, file: Path) -> Any:

@@ -130,7 +130,7 @@ def check_limits(
         return quantities
 
     merged = _merged(robot, limits)
-    grid = _grid(trajectory) if times is None else _checked_times(times)
+    grid = fine_grid(trajectory) if times is None else _checked_times(times)
     first, last = float(grid[0]), float(grid[-1])
     breaks = law_breaks(trajectory.laws.values(), first, last, ORDER)
     breaks = distinct_instants(np.append(breaks, followed.loaded.changes), first, last)
@@ -345,10 +345,10 @@ def _merged(robot: Robot, limits: Mapping[str, Limits] | Refused | None) -> dict
     return robot.limits_with(new_limits)
 
 
-def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
+def fine_grid(trajectory: JointTrajectory, least: int = BETWEEN) -> Float[np.ndarray, " time"]:
     """Return the instants of a trajectory with its ends, and evenly spaced ones between each two."""
     instants = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
-    steps = max(BETWEEN, -(-INSTANTS // (len(instants) - 1)))
+    steps = max(least, -(-INSTANTS // (len(instants) - 1)))
     evenly_spaced = instants[:-1, None] + np.diff(instants)[:, None] * (np.arange(steps) / steps)
     return np.append(evenly_spaced.reshape(-1), instants[-1])
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jounce.dynamics.limits.check_limits import INSTANTS
 from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.dynamics.limits.trajectories import drives_note
@@ -188,10 +189,11 @@ def torques_summary(
     """Return the summary of torques: the joints, the instants, joints at rest, and the state at the ends."""
     rates, instants = dataset.sizes["derivative"] - 1, dataset["time"].values
     note = f", with {count(rates, 'rate')}" if rates else ""
+    between = " and the peaks between them" if len(instants) <= INSTANTS else ""
     lines = [
         f"{dataset.attrs['title']}: torques of {count(len(dataset.data_vars), 'moving joint')}{note} "
         f"({robot.name}, {trajectory.name})",
-        f"t = {interval_text(instants[0], instants[-1])}, {count(len(instants), 'instant')}",
+        f"t = {interval_text(instants[0], instants[-1])}, {count(len(instants), 'instant')}{between}",
     ]
     lines.append(f"torques: {dataset.attrs['drives']}")
     lines += filter(None, [last_step_words(instants)])
