@@ -89,6 +89,12 @@ def test_a_trajectory():
     assert row == ["elbow", "ExpressionMotion", "0 to 2", "0 to 2", "1 to 1", "0 to 0"]
 
 
+def test_ranges_of_a_trajectory_of_few_points_are_those_between_them_too():
+    trajectory = jn.JointTrajectory({"elbow": "sin(t)"}, 0.0, 2 * np.pi, times=[0.0, np.pi, 2 * np.pi])
+    row = Tables(trajectory._repr_html_()).tables["Ranges"][1]
+    assert row[2] == "-1 to 1"
+
+
 def test_a_batch(four_bar):
     time, status = np.linspace(0, 1, 3), np.array([[0, 0, 0], [0, 6, 7]])
     outputs = {"angle": np.arange(18.0).reshape(2, 3, 3)}

@@ -13,6 +13,7 @@ import numpy as np
 from jounce.base.display import Displayed
 from jounce.design import OptimizedDesign
 from jounce.dynamics import Equilibrium, LimitReport, Linearization, Modes
+from jounce.dynamics.limits.check_limits import fine_grid
 from jounce.errors import JounceError, SampleWarning
 from jounce.integrate import Batch, RobotSimulation
 from jounce.kinematics import Assemblies, Curve, Motion, PlateCam, Status
@@ -208,7 +209,7 @@ def _robot(robot: Robot) -> list[str]:
 def _trajectory(trajectory: JointTrajectory) -> list[str]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)  # ranges only
-        values = np.asarray(trajectory.derivatives(trajectory.times, order=3))
+        values = np.asarray(trajectory.derivatives(fine_grid(trajectory, least=1), order=3))
     names = ("position", "velocity", "acceleration", "jerk")
     rows = []
     for k, name in enumerate(trajectory.names):

@@ -30,7 +30,7 @@ def test_a_robot_on_one_axis(run, files, tmp_path):
     out = tmp_path / "energies.csv"
     status, output, _ = run(*files, "--order", "1", "--rates", "1", "--out", out)
     assert status == 0
-    assert "Acceleration energy of order 1, t = 0 to 1 s" in output
+    assert "Acceleration energy of order 1, t = 0 s to 1 s, at 5 instants" in output
     table = np.genfromtxt(out, delimiter=",", names=True)
     t = np.linspace(0, 1, 5)
     w, a, j = np.cos(2 * t), -2 * np.sin(2 * t), -4 * np.cos(2 * t)

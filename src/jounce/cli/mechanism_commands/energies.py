@@ -71,6 +71,8 @@ def energies(
     """
     from jounce.io import check_writable, write
     from jounce.reporting.facts.mechanism.mechanism_facts import grid_facts
+    from jounce.reporting.text.summaries import count
+    from jounce.units.instants import interval_text
     from jounce.units.shown_units import derivative_unit
 
     for name, value in (("--order", order), ("--rates", rates)):
@@ -94,7 +96,7 @@ def energies(
     if not json:
         times = dataset["time"].values
         title = "Kinetic energy" if order == 0 else f"Acceleration energy of order {order}"
-        print_text(f"{title}, t = {times[0]:g} to {times[-1]:g} s")
+        print_text(f"{title}, t = {interval_text(times[0], times[-1])}, at {count(len(times), 'instant')}")
         for k, values in enumerate(dataset["energy"].values.T):
             unit = derivative_unit("J", 2 * order + k)
             print_text(f"  {'energy' if k == 0 else f'rate {k}'}: from {values.min():.9g} to {values.max():.9g} {unit}")
