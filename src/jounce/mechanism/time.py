@@ -114,7 +114,8 @@ def instants_of(time: TimeLike | None, parameters: Mapping[str, Any]) -> Instant
         If no grid is given, or its instants are not finite, not increasing, or more than ten million.
     """
     if time is None:
-        raise MechanismError("no time grid is given, by the mechanism or by the call", name="time")
+        message = "no time grid is given; add one, such as time: {start: 0, stop: 2, step: 0.01}, or give the instants"
+        raise MechanismError(message, name="time")
     if isinstance(time, TimeGrid):
         return _spaced(time, parameters)
     instants = np.array(seconds("time", time, MechanismError))  # a copy, since the argument may change later
