@@ -129,12 +129,12 @@ def check_dimension(dimension: Dimension, kind: str, noun: str, *, exactly: bool
 
 
 def is_rate(dimension: Dimension, bases: Iterable[str], order: int, by: str = "time") -> bool:
-    """Return whether a dimension is that of a derivative of a base quantity by time, or by another quantity.
+    """Return whether a dimension is that of a derivative of some kind of value by time, or by another quantity.
 
     If `by` is an angle or a length, powers of angles are ignored: mm, mm/rad and mm/deg^2 are rates of a cam by its
     angle.
     """
-    rates = [times(dimension_of(**{base: 1}), dimension_of(**{by: 1}), -order) for base in bases]
+    rates = [times(KINDS[base][1][0], dimension_of(**{by: 1}), -order) for base in bases]
     return dimension in rates if by == "time" else without_angles(dimension) in map(without_angles, rates)
 
 

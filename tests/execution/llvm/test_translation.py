@@ -467,6 +467,18 @@ def test_a_program_has_one_text():
     assert len(texts) == 1
 
 
+def test_the_text_has_no_loads_of_numbers_that_are_not_needed():
+    def run(unread, table, x, index):
+        return lax.while_loop(lambda s: s[1] < 1.0, lambda s: (s[0], s[1] + table[index][0]), (unread, x[0]))[1][None]
+
+    lengths = set()
+    for size in (300, 3000):
+        shapes = ((size,), jnp.float64), ((size,), jnp.float64), ((1,), jnp.float64), ((1,), jnp.int64)
+        closed = jax.make_jaxpr(run)(*(jax.ShapeDtypeStruct(*shape) for shape in shapes))
+        lengths.add(modules._text(closed, 2, {}, 8).count("\n"))
+    assert len(lengths) == 1
+
+
 @pytest.mark.parametrize("tried", [True, False])
 def test_what_another_release_of_jax_says_otherwise_is_left_to_xla(monkeypatch, tried):
     def renamed(*_, **__):

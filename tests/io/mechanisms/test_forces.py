@@ -107,6 +107,51 @@ def test_law_of_time_through_samples(tmp_path):
         written(tmp_path, "planar", entry.replace("pull", "none"))
 
 
+@pytest.mark.parametrize(
+    "law, expected",
+    [
+        ("{piecewise: [{until: 0.5 s, expression: 2*t}, {expression: 3*t**2}]}", [1.47, 4.2, 6.0]),
+        ("{piecewise: [{until: 0.6 s, expression: 8 N}], beyond: hold}", [8.0, 0.0, 0.0]),
+        ("{expression: 6*t, of: turn}", [12.6, 18.0, 0.0]),
+        ("{piecewise: [{until: 2 rad, expression: 1}, {expression: t**2}], of: turn}", [4.41, 12.6, 18.0]),
+        ("{expression: 4 N/s, derivative: 1, initial: [5 N]}", [7.8, 4.0, 0.0]),
+        ("{samples: rate.csv, value: F, derivative: 1, initial: [5 N]}", [1405.0, 2000.0, 0.0]),
+    ],
+)
+def test_laws_of_time_alone_have_every_form_and_may_follow_a_driver(tmp_path, law, expected):
+    """At 0.7 s, with the first two derivatives; the driver turns by 3 t."""
+    (tmp_path / "rate.csv").write_text("time,F [kN/s],x [mm]\n" + "\n".join(f"{t},2,1" for t in range(7)))
+    entry = f"{{F: {{type: slide_force, bodies: [ground, a], points: [[0, 0], [0, 0]], vector: [1, 0], law: {law}}}}}"
+    turn = "{turn: {type: coordinate, bodies: [ground, a], coordinate: angle, motion: 3*t}}"
+    mechanism = written(tmp_path, "planar", f"{entry}\ndrivers: {turn}")
+    found = jn.forces.TimeLaw(mechanism.forces["F"].law)
+    instants = jn.Jet.variable(0.7, order=2)
+    np.testing.assert_allclose(found(instants, instants, instants).derivatives(), expected, rtol=1e-12, atol=1e-12)
+    jn.write_mechanism(mechanism, tmp_path / "again.yaml")
+    again = jn.forces.TimeLaw(jn.load(tmp_path / "again.yaml").forces["F"].law)
+    np.testing.assert_allclose(again(instants, instants, instants).derivatives(), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "law, words",
+    [
+        (
+            "{piecewise: [{until: 1, expression: t}, {expression: -2*v}]}",
+            r"law\.piecewise\[1\].*depends on v, got '-2\*v'",
+        ),
+        ("{expression: 2*x*t, derivative: 1}", r"law\.expression: depends on x"),
+        ("{expression: 4 N, derivative: 1}", "must be force per s, got '4 N'"),
+        ("{samples: rate.csv, value: x}", "line 1, x: the unit measures a length, not a force, got 'mm'"),
+        ("{samples: rate.csv, value: F}", "line 1, F: .*not a force, got 'kN/s'"),
+    ],
+)
+def test_laws_of_time_alone_that_are_none_are_refused(tmp_path, law, words):
+    (tmp_path / "rate.csv").write_text("time,F [kN/s],x [mm]\n" + "\n".join(f"{t},2,1" for t in range(7)))
+    entry = f"{{F: {{type: slide_force, bodies: [ground, a], points: [[0, 0], [0, 0]], vector: [1, 0], law: {law}}}}}"
+    with pytest.raises(jn.errors.MechanismFileError, match=words):
+        written(tmp_path, "planar", entry)
+
+
 def test_initial_conditions_are_drivers(tmp_path):
     entry = "{start: {type: coordinate, bodies: [ground, a], coordinate: angle, motion: 30*deg + 2*t}}"
     mechanism = written(tmp_path, "planar", entry, section="initial")

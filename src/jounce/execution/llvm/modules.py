@@ -1,6 +1,7 @@
 """The LLVM module of a JAX function: its text, and its machine code."""
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -23,6 +24,7 @@ from jounce.execution.llvm.translation import translate
 LARGE = 64  # size of arrays that stay in memory if fully unrolled code is too long
 MOST_MEMORY = 2**20  # bytes on the stack: threads have little
 MOST_HEAP = 2**30  # bytes on the heap
+NAME = re.compile(r"%\w+")
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
 attributes #2 = { nounwind willreturn memory(none) "min-legal-vector-width"="512" "prefer-vector-width"="512" }
 attributes #1 = { nounwind "min-legal-vector-width"="512" "prefer-vector-width"="512" }
@@ -118,9 +120,11 @@ def _text(
         else:
             array.ravel()[:] = [code.load(region, k) for k in range(array.size)]
         given.append(array)
+    loads = len(code.lines)
     results = translate(code, closed.jaxpr, [constants(number) for number in closed.consts], given)
     for number, array in enumerate(results, len(given)):
         _write(code, number, array, rows=rows)
+    code.lines[:loads] = _needed(code.lines[:loads], code.lines[loads:])
     if code.memory > MOST_MEMORY or code.heap > MOST_HEAP:
         raise UnsupportedOperationError(f"a program with {code.memory + code.heap:,} bytes of memory of its own")
     allocation, release = [], []
@@ -171,6 +175,17 @@ def _text(
     if not single:
         lines.append(rounds_text(width))
     return "\n".join(filter(None, [*lines, ATTRIBUTES]))
+
+
+def _needed(lines: Sequence[str], later: Sequence[str]) -> list[str]:
+    """Return the lines whose values later lines need; LLVM takes minutes for the unread numbers of large tables."""
+    used, result = set(NAME.findall("\n".join(later))), []
+    for line in reversed(lines):
+        name, _, operation = line.partition(" = ")
+        if name in used:
+            used.update(NAME.findall(operation))
+            result.append(line)
+    return result[::-1]
 
 
 def _region(code: Code, number: int, kind: str, *, lanes: bool) -> Region:

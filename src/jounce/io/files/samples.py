@@ -14,7 +14,7 @@ from jounce.errors import JounceError, MechanismFileError, TrajectoryError, Unit
 from jounce.io.files.column_units import name_and_unit, unit_unread
 from jounce.io.files.long_tables import Numbers, numbers_of
 from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, known_name, read_rows
-from jounce.units.dimensions import NUMBER, TIME, Dimension, describe_dimension, dimension_of
+from jounce.units.dimensions import KINDS, NUMBER, TIME, Dimension, describe_dimension, times
 from jounce.units.shown_units import unit_size
 
 SEPARATORS = {";": "semicolons", "\t": "tabs", " ": "spaces"}
@@ -184,8 +184,8 @@ def check_named(table: Table) -> int:
 
 
 def rates(bases: Iterable[str], order: int) -> tuple[Dimension, ...]:
-    """Return the dimensions of time derivatives of angles, lengths or other quantities."""
-    return tuple(dimension_of(**{base: 1, "time": -order}) for base in bases)
+    """Return the dimensions of time derivatives of kinds of value, such as angles, lengths or forces."""
+    return tuple(times(KINDS[base][1][0], TIME, -order) for base in bases)
 
 
 def read_points(

@@ -150,13 +150,13 @@ def expressed(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
         if key in raw:
             message = "an expression has no end; write it as a piece: piecewise: [{until: ..., expression: ...}]"
             raise problem(message, key, value=UNSET)
-    if set(variables) != {"t"} and len(raw) > 1:
-        raise problem("is for laws of t only", next(key for key in raw if key != "expression"), value=UNSET)
     leader_value = leader(raw, info)
     lapse = _independent_variable(leader_value, info)
     if leader_value is not None:
-        variables = {"t": _DIMENSIONS.get(lapse)}
+        variables = {**variables, "t": _DIMENSIONS.get(lapse)}
     law = _rate_law(raw["expression"], order_of(raw), quantity, info, "expression", by=lapse, variables=variables)
+    if len(raw) > 1:
+        _check_of_time(law, variables, "expression")
     return followed_law(_integrated(law, raw, quantity, lapse, info), leader_value)
 
 
@@ -173,6 +173,14 @@ def _rate_law(
     if not order:
         return parse(raw, quantity, info, *location, variables=variables).value
     return rate(raw, order, quantity, info, *location, by=by, variables=variables)
+
+
+def _check_of_time(law: Any, variables: dict[str, Dimension | None], *location: str | int) -> None:
+    """Refuse a piece of a law, or one with a leader or a derivative, that depends on the motion, as a force may."""
+    others = sorted(law.names & variables.keys() - {"t"}) if isinstance(law, Expression) else ()
+    if others:
+        message = f"depends on {others[0]}; a piece, and a law with of or derivative, is a function of t alone"
+        raise problem(f"{message}: write one expression", *location, value=law.text)
 
 
 def _place(name: str | None) -> tuple[str | int, ...]:
@@ -222,11 +230,9 @@ def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
     entries, leader_value, level = raw["piecewise"], leader(raw, info), order_of(raw)
     if not isinstance(entries, list | tuple) or not entries:
         raise problem("must be a list such as [{until: 1 s, expression: t**2}, {expression: 1}]", "piecewise")
-    if set(variables) != {"t"}:
-        raise problem("a law of other variables than t is given by one expression", "piecewise", value=UNSET)
     lapse = _independent_variable(leader_value, info)
     if leader_value is not None:
-        variables = {"t": _DIMENSIONS.get(lapse)}
+        variables = {**variables, "t": _DIMENSIONS.get(lapse)}
     laws, ends = [], []
     for k, entry in enumerate(entries):
         last = k + 1 == len(entries)
@@ -237,6 +243,7 @@ def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
             raise problem(message + advice, "piecewise", k, value=entry)
         location = ("piecewise", k, "expression")
         law = _rate_law(entry["expression"], level, quantity, info, *location, by=lapse, variables=variables)
+        _check_of_time(law, variables, *location)
         laws.append(law if isinstance(law, Expression) else Expression(repr(law)))
         if "until" in entry:
             ends.append(parse(entry["until"], lapse, info, "piecewise", k, "until").value)
@@ -274,14 +281,14 @@ def rate(
         quantities, lapses = bases(quantity, info), [by] if by in LAPSES else LAPSES
         if not any(is_rate(value.dimension, quantities, order, lapse) for lapse in lapses):
             per = " or".join(per_power(order, LAPSES[lapse]) for lapse in lapses)
-            raise problem(f"must be {' or '.join(quantities) or 'a number'}{per}", *location, value=raw)
+            raise problem(f"must be {' or '.join(quantities)}{per}", *location, value=raw)
     return value.value
 
 
 def bases(quantity: str, info: Any) -> list[str]:
-    """Return the kinds of coordinate that a driven quantity may be; empty for other quantities, such as forces."""
+    """Return the kinds of value that a law may have."""
     quantity = at_coordinate(quantity, info.data.get("coordinate"))
-    return [quantity] if quantity in ("length", "angle") else ["angle", "length"] if quantity == "any" else []
+    return ["angle", "length"] if quantity == "any" else [quantity]
 
 
 def segmented_schema() -> dict[str, Any]:
