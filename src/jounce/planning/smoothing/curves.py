@@ -24,6 +24,7 @@ MARGIN = 1e-6  # fraction of the deviation: tolerance of the solver
 ROUNDING = 32 * np.finfo(float).eps  # of the value of a spline, relative to its largest coefficient
 ROUNDS, HALVINGS = 12, 12
 LOOKS = 8  # evaluations of the knot density in an interval
+SWINGS = 1e4  # rise of the cost, by the squared distances from all samples, of splines that swing between samples
 HALVED = 3  # cells on each side of one that is halved
 PADDING = 24  # neighboring splines that move with those at samples that are too far
 TOGETHER, AHEAD = 2000, 400  # splines that are solved for at once, and splines after them that are solved for again
@@ -248,7 +249,8 @@ class _Problem:
             settings,
         )
         solution = solver.solve()
-        if "Solved" not in str(solution.status):
+        rise = solution.obj_val * top * size**2
+        if "Solved" not in str(solution.status) or rise > SWINGS * (residual @ residual):
             missed = rows[np.abs(residual) > self.deviation]
             raise TooFarError(missed if len(missed) else rows[:1])
         coefficients[run] += np.array(solution.x) * size
