@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.interpolate import PPoly
+from scipy.interpolate import PPoly, make_lsq_spline
 
 import jounce as jn
 from jounce.errors import TrajectoryError
@@ -189,7 +189,8 @@ def test_a_motion_that_follows_noise_says_so():
     times, rate = np.arange(0, 3 + 1e-9, 2e-3), 2 * np.pi
     sine = np.stack([0.5 * rate**k * np.sin(rate * times + 0.4 + k * np.pi / 2) for k in range(4)])
     values = sine[0] + 1e-4 * np.random.default_rng(1).normal(size=len(times))
-    motion, law, found = law_of(times, values, 2e-4)
+    with pytest.warns(jn.errors.RecordingWarning, match="is below three times the noise"):
+        motion, law, found = law_of(times, values, 2e-4)
     followed = np.stack([derivative(law, times, k) for k in range(4)])
     peaks = np.abs(followed).max(axis=1)
     true = np.quantile(np.abs(followed - sine), 0.99, axis=1) / peaks
@@ -214,6 +215,16 @@ def test_a_deviation_below_the_noise_is_kept_where_it_can_be():
     assert own.follows_noise(1.5e-4)
     assert np.abs(derivative(law, times, 0) - values).max() <= 1.5e-4
     assert 0.8e-4 < own.noise < 1.2e-4
+
+
+@pytest.mark.parametrize("size, intervals", [(0.0, []), (0.02, [50, 51])])
+def test_swings_between_samples_are_found(size, intervals):
+    times, dense = np.linspace(0, 1, 101), np.linspace(0, 1, 4001)
+    samples = bases.Samples(times, np.sin(7 * times), np.linspace(0, 1, 401))
+    swing = size * np.sin(100 * np.pi * dense) ** 2 * ((dense > 0.5) & (dense < 0.52))  # zero at the samples
+    values = np.sin(7 * dense) + swing - samples.middle
+    spline = make_lsq_spline(dense / samples.scale, values, bases.whole(samples.knots), bases.DEGREE)
+    assert curves._Problem(samples, None, values, 1e-5)._swings(spline.c).tolist() == intervals
 
 
 @pytest.mark.filterwarnings("ignore:a. the deviation")  # the noise of few samples is unsure

@@ -23,8 +23,10 @@ FEWEST = 8  # cells between two dwells
 MARGIN = 1e-6  # fraction of the deviation: tolerance of the solver
 ROUNDING = 32 * np.finfo(float).eps  # of the value of a spline, relative to its largest coefficient
 ROUNDS, HALVINGS = 12, 12
+LOOSE = 4.0  # deviations that a spline may be from lines between samples without bends
 LOOKS = 8  # evaluations of the knot density in an interval
-SWINGS = 1e4  # rise of the cost, by the squared distances from all samples, of splines that swing between samples
+NEARBY = 32  # samples whose bends explain those of the spline
+RINGING = 0.6  # ratio of neighboring half-waves with which splines ring beside a bend: 0.535 for degree 7
 HALVED = 3  # cells on each side of one that is halved
 PADDING = 24  # neighboring splines that move with those at samples that are too far
 TOGETHER, AHEAD = 2000, 400  # splines that are solved for at once, and splines after them that are solved for again
@@ -183,10 +185,10 @@ class _Problem:
 
     def within(self, coefficients: np.ndarray, is_free: np.ndarray) -> Float[np.ndarray, " spline"]:
         """Return the coefficients of a spline within the deviation."""
+        missed = self._far(coefficients)
+        if not len(missed):
+            return coefficients
         for _ in range(ROUNDS):
-            missed = self._far(coefficients)
-            if not len(missed):
-                return coefficients
             is_moved = np.zeros(len(coefficients), bool)
             for cell in np.unique(self._cells(missed)):
                 is_moved[max(cell - PADDING, 0) : cell + DEGREE + 1 + PADDING] = True
@@ -196,7 +198,11 @@ class _Problem:
             for run in _runs(is_moved):
                 for chunk in _parts(run):
                     self._move(coefficients, chunk, run.stop)
-        if len(missed := self._far(coefficients)):
+            missed = self._far(coefficients)
+            if not len(missed):
+                missed = self._swings(coefficients)
+                break
+        if len(missed):
             raise TooFarError(missed)
         return coefficients
 
@@ -215,6 +221,25 @@ class _Problem:
             self.away = max(self.away, float(distances.max()))
             missed.append(chunk.start + np.flatnonzero(distances > self.deviation))
         return np.concatenate(missed)
+
+    def _swings(self, coefficients: np.ndarray) -> Int[np.ndarray, " some"]:
+        """Return the samples before intervals in which a spline swings by more than the bends of samples explain."""
+        from scipy.interpolate import BSpline
+
+        spline, found = BSpline(whole(self.samples.knots), coefficients, DEGREE), [np.zeros(0, int)]
+        for part in parts_of(len(self.samples)):
+            chunk = slice(max(part.start - NEARBY, 0), part.stop + NEARBY)
+            times, values = self.samples.times(chunk), self.samples.values(chunk)
+            steps = np.diff(times)
+            bends = np.abs(np.diff(np.diff(values) / steps)) * 2 / (steps[1:] + steps[:-1])
+            logarithms = np.log(np.maximum(np.append(bends, 0.0), np.append(0.0, bends)) + 1e-300)
+            falls = np.log(RINGING) * np.arange(len(steps))
+            before = np.maximum.accumulate(logarithms - falls) + falls
+            after = np.maximum.accumulate((logarithms + falls)[::-1])[::-1] - falls
+            allowed = np.exp(np.maximum(before, after)) * steps**2 + LOOSE * self.deviation
+            departures = np.abs(spline((times[1:] + times[:-1]) / 2) - (values[1:] + values[:-1]) / 2)
+            found.append(chunk.start + np.flatnonzero(departures > allowed))
+        return np.unique(np.concatenate(found))
 
     def _move(self, coefficients: np.ndarray, run: slice, last: int) -> None:
         """Change a run of coefficients such that all samples under its splines are within the deviation.
@@ -235,7 +260,9 @@ class _Problem:
         target = self.right[run] - self.system[run] @ coefficients
         size = self.deviation
         inside = 1 - MARGIN - ROUNDING * float(np.abs(coefficients).max()) / size
-        bounds = np.concatenate([inside + residual / size, inside - residual / size])
+        distances = np.abs(residual) / size
+        limits = np.maximum(inside, np.where(distances <= 1, distances, 0.0))  # splines at the ends hardly move samples
+        bounds = np.concatenate([limits + residual / size, limits - residual / size])
         quadratic = sparse.triu(self.system[run, run], format="csc")
         top = float(quadratic.diagonal().max())
         settings = clarabel.DefaultSettings()
@@ -249,9 +276,8 @@ class _Problem:
             settings,
         )
         solution = solver.solve()
-        rise = solution.obj_val * top * size**2
-        if "Solved" not in str(solution.status) or rise > SWINGS * (residual @ residual):
-            missed = rows[np.abs(residual) > self.deviation]
+        if "Solved" not in str(solution.status):
+            missed = rows[distances > 1]
             raise TooFarError(missed if len(missed) else rows[:1])
         coefficients[run] += np.array(solution.x) * size
 
