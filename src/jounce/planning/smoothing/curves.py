@@ -226,7 +226,8 @@ class _Problem:
         """Return the samples before intervals in which a spline swings by more than the bends of samples explain."""
         from scipy.interpolate import BSpline
 
-        spline, found = BSpline(whole(self.samples.knots), coefficients, DEGREE), [np.zeros(0, int)]
+        spline = BSpline(whole(self.samples.knots), coefficients, DEGREE)
+        swings = [np.zeros(0, int)]
         for part in parts_of(len(self.samples)):
             chunk = slice(max(part.start - NEARBY, 0), part.stop + NEARBY)
             times, values = self.samples.times(chunk), self.samples.values(chunk)
@@ -238,8 +239,8 @@ class _Problem:
             after = np.maximum.accumulate((logarithms + falls)[::-1])[::-1] - falls
             allowed = np.exp(np.maximum(before, after)) * steps**2 + LOOSE * self.deviation
             departures = np.abs(spline((times[1:] + times[:-1]) / 2) - (values[1:] + values[:-1]) / 2)
-            found.append(chunk.start + np.flatnonzero(departures > allowed))
-        return np.unique(np.concatenate(found))
+            swings.append(chunk.start + np.flatnonzero(departures > allowed))
+        return np.unique(np.concatenate(swings))
 
     def _move(self, coefficients: np.ndarray, run: slice, last: int) -> None:
         """Change a run of coefficients such that all samples under its splines are within the deviation.
