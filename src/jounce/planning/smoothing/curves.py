@@ -28,7 +28,7 @@ LOOKS = 8  # evaluations of the knot density in an interval
 NEARBY = 32  # samples whose bends explain those of the spline
 RINGING = 0.6  # ratio of neighboring half-waves with which splines ring beside a bend: 0.535 for degree 7
 HALVED = 3  # cells on each side of one that is halved
-PADDING = 24  # neighboring splines that move with those at samples that are too far
+PADDING = 64  # neighboring splines that move with those at samples that are too far
 TOGETHER, AHEAD = 2000, 400  # splines that are solved for at once, and splines after them that are solved for again
 
 
