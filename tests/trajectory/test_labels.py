@@ -1,5 +1,8 @@
 """Labels of arrays: joints are told by their names, whatever their order, at every door of robots."""
 
+import copy
+import pickle
+
 import numpy as np
 import pandas
 import pytest
@@ -67,6 +70,13 @@ def test_parts_of_the_values_of_a_trajectory_keep_their_joints(arm):
         np.float64,
         np.ndarray,
     ]
+
+
+def test_copies_of_the_values_of_a_trajectory_keep_their_joints(arm):
+    q = of_trajectory("CAB")
+    for copied in (q.copy(), copy.copy(q), copy.deepcopy(q), pickle.loads(pickle.dumps(q))):
+        assert not np.shares_memory(copied, q)
+        np.testing.assert_array_equal(jn.inverse_dynamics(arm, copied)[0], jn.inverse_dynamics(arm, Q))
 
 
 def test_values_of_joints_some_of_which_the_robot_lacks_are_refused(arm):

@@ -12,7 +12,7 @@ import numpy as np
 
 
 class JointValues(np.ndarray):
-    """An array that knows the joints along its last axis, as do its parts."""
+    """An array that knows the joints along its last axis, as do its parts and copies, also in other processes."""
 
     joint_names: tuple[str, ...] = ()
 
@@ -30,6 +30,19 @@ class JointValues(np.ndarray):
             row = columns[(0,) * (columns.ndim - 1)].tolist()
             part.joint_names = tuple(self.joint_names[k] for k in row) if len({*row}) == len(row) else ()
         return part
+
+    def copy(self, order: Any = "C") -> JointValues:
+        copied = super().copy(order)
+        copied.joint_names = self.joint_names
+        return copied
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: object) -> JointValues:
+        return self.copy()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return JointValues.of, (self.joint_names, np.asarray(self))
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
         return array[()] if return_scalar else np.asarray(array)
