@@ -64,6 +64,8 @@ def test_table_of_common_units_agrees_with_pint(name):
         ("2 nautical_mile", 3704.0),
         ("90 arcmin", math.pi / 120),
         ("1e-3", 1e-3),
+        ("2e3", 2000.0),
+        ("-1.5E3", -1500.0),
         ("2*pi", 2 * math.pi),
         ("0.36/pi", 0.36 / math.pi),
         ("1 / pi**2", 1 / math.pi**2),

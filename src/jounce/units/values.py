@@ -20,7 +20,7 @@ from jounce.units.pint_units import ask_pint
 from jounce.units.table import COMMON, COMPACT, Size, nearest_unit
 
 _DIGITS = str.maketrans("\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT TWO}\N{SUPERSCRIPT THREE}\N{SUPERSCRIPT FOUR}", "1234")
-_NUMBER_PATTERN = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+_NUMBER_PATTERN = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?+"  # possessive: 1e3 is no 1 with a unit e3
 _ATOM = r"[A-Za-z_\u00b0\u00b5\u03bc][A-Za-z_0-9]*"
 _WHOLE = r"[-+]?[0-9]{1,2}"
 _POWER = rf"(?:\s*(?:\*\*|\^)\s*(?:{_WHOLE}|\(\s*{_WHOLE}\s*\))|\u207b?[\u00b9\u00b2\u00b3\u2074])?"

@@ -61,6 +61,16 @@ def test_a_payload_adds_its_weight(run, files, tmp_path):
     np.testing.assert_allclose(found["pin"].values[:, 0], expected, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("part", ["", "@0.35 s:750 ms"])
+def test_a_payload_that_is_likely_in_grams_is_warned_of(run, files, part):
+    """With a unit, or lighter than the robot, it may be any."""
+    for payload in ("tip=500 kg", "tip=0.5"):
+        assert "warning" not in run(*files, "--rates", 0, "--payload", payload + part)[2]
+    status, _, messages = run(*files, "--rates", 0, "--payload", "tip=500" + part)
+    assert status == 0
+    assert "--payload: 500 kg, more than the robot, which has 2 kg; grams need their unit: 500 g" in messages
+
+
 def test_a_payload_is_carried_for_a_part_of_the_motion(run, files, tmp_path):
     out = tmp_path / "tau.csv"
     status, printed, _ = run(*files, "--rates", 0, "--out", out, "--payload", "tip=3 kg@0.35 s:750 ms")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from jounce.errors import JounceError, RobotError, check_name
+from jounce.errors import JounceError, RobotError, UnitWarning, check_name, warn_caller
 from jounce.io.files.assignments import assignments
 from jounce.rigid.inertia import Inertia
 from jounce.robot.algorithms.carried_loads import CarriedLoad
@@ -31,6 +31,11 @@ def with_payloads(robot: Robot, texts: Iterable[str]) -> Robot:
     RobotError
         If a link does not exist, a mass is not valid, or a load is for a part of a motion.
 
+    Warns
+    -----
+    UnitWarning
+        If a mass without a unit is larger than that of the robot.
+
     Examples
     --------
     >>> import jounce as jn
@@ -45,7 +50,7 @@ def with_payloads(robot: Robot, texts: Iterable[str]) -> Robot:
             message = "a load that is carried for a part of a motion is for check, torques, retime and export only"
             raise RobotError(message, name=OPTION, value=f"{link}={mass}")
         try:
-            robot = robot.with_payload(link, Inertia(_mass(mass)))
+            robot = robot.with_payload(link, Inertia(_mass(robot, mass)))
         except JounceError as error:
             value = link if error.name == "link" else mass
             raise RobotError(error.message, name=OPTION, value=value) from None
@@ -70,6 +75,11 @@ def parsed_loads(robot: Robot, texts: Iterable[str], *, moving: bool = False) ->
     RobotError
         If a link does not exist, or a mass or an end is not valid.
 
+    Warns
+    -----
+    UnitWarning
+        If a mass without a unit is larger than that of the robot.
+
     Examples
     --------
     >>> import jounce as jn
@@ -90,16 +100,20 @@ def parsed_loads(robot: Robot, texts: Iterable[str], *, moving: bool = False) ->
             (start, by), (stop, other) = _place(first), _place(last)
             if by and other and by != other:
                 raise RobotError("both ends are of one kind", name="place")
-            loads.append(CarriedLoad(link, Inertia(_mass(mass)), start, stop, by or other or "time", moving))  # type: ignore[arg-type]
+            loads.append(CarriedLoad(link, Inertia(_mass(robot, mass)), start, stop, by or other or "time", moving))  # type: ignore[arg-type]
         except JounceError as error:
             raise RobotError(error.message, name=OPTION, value=text) from None
     return loads
 
 
-def _mass(text: str) -> float:
-    number = parse_value(text, "mass").value
-    assert isinstance(number, float)  # expressions are evaluated, since no names are allowed
-    return number
+def _mass(robot: Robot, text: str) -> float:
+    value = parse_value(text, "mass")
+    mass = value.value
+    assert isinstance(mass, float)  # expressions are evaluated, since no names are allowed
+    if value.dimension is None and 0 < robot.mass < mass:
+        hint = f"{mass:g} kg, more than the robot, which has {robot.mass:.3g} kg; grams need their unit: {mass:g} g"
+        warn_caller(UnitWarning(f"{OPTION}: {hint}"))
+    return mass
 
 
 def _place(text: str) -> tuple[float | None, str | None]:
