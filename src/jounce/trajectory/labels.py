@@ -32,6 +32,7 @@ class JointValues(np.ndarray):
         return part
 
     def copy(self, order: Any = "C") -> JointValues:
+        """Return a copy with the same joints."""
         copied = super().copy(order)
         copied.joint_names = self.joint_names
         return copied
