@@ -37,7 +37,8 @@ class JointValues(np.ndarray):
         copied.joint_names = self.joint_names
         return copied
 
-    __copy__ = copy
+    def __copy__(self) -> JointValues:
+        return self.copy()
 
     def __deepcopy__(self, memo: object) -> JointValues:
         return self.copy()
