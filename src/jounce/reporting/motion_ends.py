@@ -9,9 +9,9 @@ import numpy as np
 
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.planning.paths.sampled_paths import lines_of
-from jounce.planning.paths.straight_lines import polynomials_at
 from jounce.planning.smoothing.smooth import SmoothedTrajectory, sampled
 from jounce.trajectory import HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
+from jounce.trajectory.splines import pieces_at
 from jounce.units.instants import time_text
 
 WITH_VELOCITIES = 5  # degree of splines through positions and velocities
@@ -103,7 +103,7 @@ def _largest_deviation(trajectory: JointTrajectory) -> tuple[float, str | None, 
     assert lines is not None
     fractions = np.arange(1, LOOKS) / LOOKS
     at = (lines.at[:-1, None] + np.diff(lines.at)[:, None] * fractions).reshape(-1)
-    positions = np.stack([polynomials_at(law, at) for law in trajectory.laws.values()], axis=1)  # type: ignore[arg-type]
+    positions = np.stack([pieces_at(law, at) for law in trajectory.laws.values()], axis=1)
     deviations = lines.distances(at, positions)
     k = int(np.argmax(deviations))
     if not deviations[k] > 0:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from numpy.polynomial.polynomial import polyder, polyval
 
 from jounce.base.shapes import ArrayLike
 from jounce.errors import MechanismError, TrajectoryError
@@ -75,6 +76,13 @@ def local_powers(
     FITPACK's splev, whose arrays end at degree 5: it crashes from degree 9 on.
     """
     return np.stack([spline(beginnings, nu=k) / math.factorial(k) for k in range(degree + 1)])
+
+
+def pieces_at(law: Any, instants: Float[np.ndarray, " instants"], order: int = 0) -> Float[np.ndarray, " instants"]:
+    """Return a derivative of a law of piecewise polynomials, by NumPy, so that no program is compiled for it."""
+    begins, powers = np.asarray(law.breakpoints, float), polyder(np.asarray(law.coefficients, float), order)
+    index = np.clip(np.searchsorted(begins, instants, side="right") - 1, 0, len(begins) - 1)
+    return np.asarray(polyval(instants - begins[index], powers[:, index], tensor=False))
 
 
 def integrated(pieces: _Pieces, lengths: Float[np.ndarray, " pieces"]) -> Float[np.ndarray, "raised pieces"]:

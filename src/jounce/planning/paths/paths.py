@@ -15,13 +15,13 @@ from jounce.errors import JounceError, TrajectoryError, whole_number
 from jounce.jet import Jet
 from jounce.planning.paths.path import Path
 from jounce.planning.paths.sampled_paths import lines_along, path_of_samples
-from jounce.planning.paths.straight_lines import Lines, polynomials_at, rounded
+from jounce.planning.paths.straight_lines import Lines, rounded
 from jounce.trajectory import AbstractMotion, Expression, JointTrajectory, PiecewiseMotion, SplineMotion
 from jounce.trajectory.checks import finite, finite_row, positive
 from jounce.trajectory.knots import knot_jumps
 from jounce.trajectory.labels import in_order
 from jounce.trajectory.law_checks.seen_jumps import level_sizes, unexplained
-from jounce.trajectory.splines import HIGHEST_DEGREE
+from jounce.trajectory.splines import HIGHEST_DEGREE, pieces_at
 
 DEGREE = 5  # of the splines through waypoints
 KINK_CELLS = 2000  # cells of the search for kinks
@@ -176,7 +176,7 @@ def _between(lines: Lines, order: int, shape: Between) -> Path:
     degree = next(d for d in (*degrees, 3, 2, 1) if len(lines.at) > d and d <= degrees[0])
     laws = {name: SplineMotion(lines.at, x, degree) for name, x in zip(lines.names, lines.points.T, strict=True)}
     points = (lines.at[:-1, None] + np.diff(lines.at)[:, None] * np.arange(1, LOOKS) / LOOKS).reshape(-1)
-    distances = lines.distances(points, np.stack([polynomials_at(law, points) for law in laws.values()], axis=1))
+    distances = lines.distances(points, np.stack([pieces_at(law, points) for law in laws.values()], axis=1))
     note = f"splines of degree {degree} through {len(lines.at)} waypoints"
     start, stop = float(lines.at[0]), float(lines.at[-1])
     return Path(dict(laws), start, stop, float(distances.max()), words=note, passed=(lines.at, lines.at), points=lines)

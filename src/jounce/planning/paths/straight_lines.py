@@ -17,7 +17,6 @@ from jaxtyping import Float, Int
 from jounce.errors import TrajectoryError
 from jounce.planning.paths.path import Path
 from jounce.planning.pieces import SmoothPieces
-from jounce.trajectory import SplineMotion
 from jounce.trajectory.splines import local_powers
 
 DEGREE = 5
@@ -67,13 +66,6 @@ class Lines:
             line = np.clip(interval + step, 0, len(self.at) - 2)
             distances = np.minimum(distances, _distances_from_lines(points, self.points[line], self.points[line + 1]))
         return distances
-
-
-def polynomials_at(law: SplineMotion, parameters: Float[np.ndarray, " point"]) -> Float[np.ndarray, " point"]:
-    """Return the values of the polynomials of a spline, without compiling a program."""
-    begins, powers = np.asarray(law.breakpoints, float), np.asarray(law.coefficients, float)
-    index = np.clip(np.searchsorted(begins, parameters, side="right") - 1, 0, len(begins) - 1)
-    return np.polynomial.polynomial.polyval(parameters - begins[index], powers[:, index], tensor=False)
 
 
 def _distances_from_lines(points: np.ndarray, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " point"]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
+from numpy.polynomial.polynomial import polyder, polyval
 
 from jounce.errors import MechanismError, check_name, did_you_mean
 from jounce.kinematics import Motion
@@ -167,12 +167,9 @@ def _curve(time: Line, jets: Float[np.ndarray, "time levels"], order: int) -> Li
         return values
     if time[-1] < time[0]:
         return _curve(time[::-1], jets[::-1], order)[::-1]
-    powers = hermite_pieces(time, jets)[order:, :-1]
-    factors = np.array([math.perm(k + order, order) for k in range(len(powers))], float)
+    powers = polyder(hermite_pieces(time, jets)[:, :-1], order)
     fractions = np.arange(steps) / steps
-    smooth = np.polynomial.polynomial.polyval(
-        fractions * np.diff(time)[:, None], (powers * factors[:, None])[:, :, None], tensor=False
-    )
+    smooth = polyval(fractions * np.diff(time)[:, None], powers[:, :, None], tensor=False)
     straight = values[:-1, None] + fractions * np.diff(values)[:, None]
     slack = LEAVING * np.ptp(finite)
     stays_near = ((smooth >= finite.min() - slack) & (smooth <= finite.max() + slack)).all(axis=1, keepdims=True)

@@ -11,6 +11,7 @@ from jounce.trajectory.checks import check_samples
 from jounce.trajectory.motion import SplineMotion
 from jounce.trajectory.sample_errors import INTERPOLATION_SAFETY, NOISE_SAFETY, noise
 from jounce.trajectory.sampled.hermite import HermiteMotion
+from jounce.trajectory.splines import pieces_at
 
 MOST = 3  # levels: positions, velocities, accelerations
 WINDOW = 24  # instants over which a sample has influence
@@ -67,7 +68,7 @@ class HermiteSplineMotion(SplineMotion):
 
     def at(self, instants: Float[np.ndarray, " instants"], order: int) -> Float[np.ndarray, " instants"]:
         """Return a derivative at instants, by NumPy only."""
-        return _derivative(self, instants, order)
+        return pieces_at(self, instants, order)
 
 
 def _spline(times: np.ndarray, table: np.ndarray) -> HermiteMotion:
@@ -120,14 +121,6 @@ def _end_condition(levels: int) -> Float[np.ndarray, " given"]:
     return _basis(levels)[-1]
 
 
-def _derivative(law: SplineMotion, instants: np.ndarray, order: int) -> Float[np.ndarray, " instants"]:
-    begins, powers = np.asarray(law.breakpoints, float), np.asarray(law.coefficients, float)
-    index = np.clip(np.searchsorted(begins, instants, side="right") - 1, 0, len(begins) - 1)
-    factors = np.array([math.perm(k, order) for k in range(order, len(powers))], float)
-    chosen = powers[order:, index] * factors[:, None]
-    return np.polynomial.polynomial.polyval(instants - begins[index], chosen, tensor=False)
-
-
 def _errors(times: np.ndarray, table: np.ndarray) -> Float[np.ndarray, " derivative"]:
     """Return estimated relative errors of the derivatives, like `derivative_errors` for positions only.
 
@@ -153,8 +146,8 @@ def _errors(times: np.ndarray, table: np.ndarray) -> Float[np.ndarray, " derivat
     errors = np.ones(degree + 1)
     influence = [_influence(grid, inner, levels, level, degree) for level in range(levels)]
     for k in range(degree + 1):
-        curve = _derivative(fine, looks, k)
-        difference = float(np.abs(curve - _derivative(coarse, looks, k)).max()) / (2.0 ** max(degree - k, 1) - 1)
+        curve = pieces_at(fine, looks, k)
+        difference = float(np.abs(curve - pieces_at(coarse, looks, k)).max()) / (2.0 ** max(degree - k, 1) - 1)
         spread = math.hypot(
             *(s * i[k] * step ** (j - k) for j, (s, i) in enumerate(zip(sigmas, influence, strict=True)))
         )
@@ -170,5 +163,5 @@ def _influence(grid: np.ndarray, instants: np.ndarray, levels: int, level: int, 
         table = np.zeros((len(grid), levels))
         table[k, level] = 1.0
         law = _spline(grid, table)
-        squares += np.stack([_derivative(law, instants, order) ** 2 for order in range(degree + 1)])
+        squares += np.stack([pieces_at(law, instants, order) ** 2 for order in range(degree + 1)])
     return np.sqrt(squares.max(axis=1)).tolist()

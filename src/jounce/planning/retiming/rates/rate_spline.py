@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jounce.base.shapes import ArrayLike
 from jounce.trajectory import SplineMotion
-from jounce.trajectory.splines import local_powers
+from jounce.trajectory.splines import local_powers, pieces_at
 
 SMOOTHNESS = 9  # degree of the parametrization
 KNOT_INTERVALS = 24  # of the parametrization
@@ -48,16 +48,7 @@ class Parametrization(SplineMotion):
 
     def derivatives(self, u: _Points, order: int) -> Float[np.ndarray, "derivative point"]:
         """Return s and its derivatives by u."""
-        begins, powers = np.asarray(self.breakpoints), np.asarray(self.coefficients)
-        index = np.clip(np.searchsorted(begins, u, side="right") - 1, 0, None)
-        local, piece_powers = u - begins[index], powers[:, index]
-        return np.stack(
-            [np.polynomial.polynomial.polyval(local, _derived(piece_powers, k), tensor=False) for k in range(order + 1)]
-        )
-
-
-def _derived(powers: np.ndarray, times: int) -> np.ndarray:
-    return np.polynomial.polynomial.polyder(powers, times) if times else powers
+        return np.stack([pieces_at(self, u, k) for k in range(order + 1)])
 
 
 def clamped(intervals: int, degree: int) -> _Points:
