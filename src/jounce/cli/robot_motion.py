@@ -83,7 +83,7 @@ class RobotRun:
         """Return the start state: coordinates, at rest."""
         import numpy as np
 
-        from jounce.io.files.assignments import assignments
+        from jounce.units.assignments import assignments
         from jounce.units.values import parse_value
 
         form = "a start is given by JOINT=VALUE, such as 'elbow=30 deg'"
@@ -102,7 +102,7 @@ class RobotRun:
 
     def laws(self, option: str) -> dict[str, str]:
         """Return the laws of an option by joint."""
-        from jounce.io.files.assignments import assignments
+        from jounce.units.assignments import assignments
 
         form = f"a law is given by JOINT=LAW, such as --{option} 'elbow=5*sin(t)'"
         return dict(assignments(getattr(self, option) or (), f"--{option}", form, RobotError))

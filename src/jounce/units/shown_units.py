@@ -17,6 +17,7 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.errors import JounceError, UnitError, no_such
+from jounce.units.assignments import assignments
 from jounce.units.dimensions import (
     ANGLE,
     FORCE,
@@ -229,12 +230,5 @@ def units_given(texts: Iterable[str]) -> dict[str, str]:
     >>> units_given(["angle=deg,length=mm", "C=cm"])
     {'angle': 'deg', 'length': 'mm', 'C': 'cm'}
     """
-    units: dict[str, str] = {}
-    for text in (part for given in texts for part in given.split(",")):
-        name, _, unit = (part.strip() for part in text.partition("="))
-        if not name or not unit:
-            raise UnitError("units are given by NAME=UNIT, such as angle=deg,length=mm", name="--units", value=text)
-        if name in units:
-            raise UnitError(f"is given more than once, as {units[name]} and as {unit}", name=f"--units {name}")
-        units[name] = unit
-    return units
+    parts = (part for given in texts for part in given.split(","))
+    return assignments(parts, "--units", "units are given by NAME=UNIT, such as angle=deg,length=mm", UnitError)

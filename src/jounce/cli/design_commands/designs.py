@@ -91,9 +91,9 @@ def optimize(
         --subject-to "span(psi) == 30 deg"
     """
     from jounce.io.files import DATA_FILES
-    from jounce.io.files.assignments import assignments
     from jounce.io.files.writing import check_target
     from jounce.io.mechanisms.schema.unit_hints import warn_of_variations
+    from jounce.units.assignments import assignments
 
     if out is not None:
         check_target(out, DATA_FILES, "mechanism file", overwrite=overwrite)

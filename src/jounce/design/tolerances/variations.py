@@ -11,6 +11,7 @@ from jaxtyping import Float
 from jounce.base.shapes import real_numbers
 from jounce.errors import ExpressionError, JounceError, MechanismError, check_name, did_you_mean
 from jounce.mechanism import Mechanism
+from jounce.units.assignments import assignments
 
 FORMS = "LOW:HIGH, LOW:HIGH:COUNT, normal:SIGMA or uniform:HALFWIDTH"
 MOST_VALUES = 10_000_000  # of one parameter
@@ -132,15 +133,7 @@ def named_forms(texts: Iterable[str]) -> dict[str, str]:
     >>> named_forms(["BC=12cm:16cm", "AB = normal:0.1mm"])
     {'BC': '12cm:16cm', 'AB': 'normal:0.1mm'}
     """
-    forms: dict[str, str] = {}
-    for text in texts:
-        name, _, form = (part.strip() for part in text.partition("="))
-        if not name or not form:
-            raise MechanismError(f"a parameter varies by NAME=FORM, where FORM is {FORMS}", name="--vary", value=text)
-        if name in forms:
-            raise MechanismError(f"is given more than once, as {forms[name]} and as {form}", name=f"--vary {name}")
-        forms[name] = form
-    return forms
+    return assignments(texts, "--vary", f"a parameter varies by NAME=FORM, where FORM is {FORMS}", MechanismError)
 
 
 def reader_of(mechanism: Mechanism) -> Reader:

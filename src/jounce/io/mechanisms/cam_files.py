@@ -21,7 +21,6 @@ from jounce.errors import (
     did_you_mean,
     warn_caller,
 )
-from jounce.io.files.assignments import assignments
 from jounce.io.files.located_data import Source
 from jounce.io.files.samples import rates, read_samples
 from jounce.io.files.source import read_source
@@ -34,6 +33,7 @@ from jounce.mechanism.resolve import resolve_motion
 from jounce.settings import under_own_settings
 from jounce.trajectory import AbstractMotion, Expression, SplineMotion
 from jounce.trajectory.law_checks.unit_doubts import values_of
+from jounce.units.assignments import assignments
 from jounce.units.dimensions import Dimension
 from jounce.units.expression import check_parameter_name
 

@@ -13,7 +13,6 @@ from typing import Any
 
 from jounce.dynamics import DriverForceOutput, DriverTorqueOutput
 from jounce.errors import JounceError, RobotError, check_name
-from jounce.io.files.assignments import assignments
 from jounce.io.files.reading import named_file
 from jounce.io.files.source import read_source
 from jounce.mechanism import Mechanism, TimeGrid
@@ -21,6 +20,7 @@ from jounce.mechanism.mechanism import GROUND, names_column
 from jounce.robot import Robot
 from jounce.robot.closed_loops.closed_loop import DRIVE
 from jounce.robot.model.couplings import Tendon
+from jounce.units.assignments import assignments
 from jounce.units.values import parse_value
 
 

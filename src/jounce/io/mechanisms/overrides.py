@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from jounce.errors import JounceError, MechanismError, check_name
-from jounce.io.files.assignments import assignments
 from jounce.io.mechanisms.schema.unit_hints import is_plain, warn_of_values
 from jounce.mechanism import Mechanism, TimeGrid
 from jounce.mechanism.time import instants_of
+from jounce.units.assignments import assignments
 from jounce.units.values import parse_value
 
 

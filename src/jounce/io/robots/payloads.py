@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable
 
 from jounce.errors import JounceError, RobotError, UnitWarning, check_name, warn_caller
-from jounce.io.files.assignments import assignments
 from jounce.rigid.inertia import Inertia
 from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.robot.robot import Robot
+from jounce.units.assignments import assignments
 from jounce.units.values import parse_value
 
 OPTION = "--payload"
