@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jounce.cli.arguments import check_ending
 from jounce.cli.file_kinds import explaining_other_kinds
 from jounce.cli.options import MechanismReading, RobotReading, errors_about, print_result, spare_inputs, written
-from jounce.errors import JounceError
+from jounce.errors import JounceError, SampleWarning
 from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.terminal import print_text
 
@@ -36,7 +37,8 @@ def energies(
     r"""Compute acceleration energies of any order, and their rates.
 
     Order 0 is the kinetic energy, order 1 Gibbs' energy of accelerations.
-    Negrean 2025, equations 65-122.
+    Negrean 2025, equations 65-122. Of a robot, the extreme values are
+    those at 2000 instants or more, and on both sides of jumps and kinks.
 
     Parameters
     ----------
@@ -73,7 +75,6 @@ def energies(
     from jounce.reporting.facts.mechanism.mechanism_facts import grid_facts
     from jounce.reporting.text.summaries import count
     from jounce.units.instants import interval_text
-    from jounce.units.shown_units import derivative_unit
 
     for name, value in (("--order", order), ("--rates", rates)):
         if not 0 <= value <= MOST - (order if name == "--rates" else 0):
@@ -84,34 +85,39 @@ def energies(
     if out is not None:
         check_writable(out, overwrite=overwrite)
     if file.suffix.lower() in ROBOT_FILES:
-        dataset = _of_robot(RobotReading(allow=allow), file, trajectory, order, rates, drives=not no_drives)
+        dataset, between = _of_robot(RobotReading(allow=allow), file, trajectory, order, rates, drives=not no_drives)
     elif trajectory is not None:
         raise JounceError("is for robots; a mechanism file has its motion", name="trajectory", path=trajectory)
     else:
         reading = MechanismReading(set_=set_, import_=import_, allow=allow)
-        dataset = _of_mechanism(reading, file, order, rates)
+        dataset, between = _of_mechanism(reading, file, order, rates), None
     spare_inputs(out, overwrite=overwrite)
     if out is not None:
         written(lambda: write(dataset, out, overwrite=overwrite))
+    extremes = _peaks(dataset, between, order)
     if not json:
         times = dataset["time"].values
         title = "Kinetic energy" if order == 0 else f"Acceleration energy of order {order}"
-        print_text(f"{title}, t = {interval_text(times[0], times[-1])}, at {count(len(times), 'instant')}")
-        for k, values in enumerate(dataset["energy"].values.T):
-            unit = derivative_unit("J", 2 * order + k)
-            print_text(f"  {'energy' if k == 0 else f'rate {k}'}: from {values.min():.9g} to {values.max():.9g} {unit}")
+        places = count(len(times), "instant") + ("" if between is None else " and between them")
+        print_text(f"{title}, t = {interval_text(times[0], times[-1])}, at {places}")
+        for row in extremes[: rates + 1]:
+            name = "energy" if row["rate"] == 0 else f"rate {row['rate']}"
+            print_text(f"  {name}: from {row['minimum']:.9g} to {row['maximum']:.9g} {row['unit']}")
     facts = {"file": str(file), "trajectory": None if trajectory is None else str(trajectory)}
     facts |= {"order": order, "rates": rates, "time": grid_facts(dataset["time"].values)}
-    print_result("energies", lambda: {**facts, "peaks": _peaks(dataset, order), "written": out}, out, json=json)
+    print_result("energies", lambda: {**facts, "peaks": extremes, "written": out}, out, json=json)
     return 0
 
 
-def _peaks(dataset: xarray.Dataset, order: int) -> list[dict[str, Any]]:
-    """Return the extreme values of the energies, and of their rates, of all bodies together and of each."""
+def _peaks(dataset: xarray.Dataset, between: xarray.Dataset | None, order: int) -> list[dict[str, Any]]:
+    """Return the extreme values of the energies, and of their rates, of all bodies together first, and of each."""
     import numpy as np
+    import xarray
 
     from jounce.units.shown_units import derivative_unit
 
+    if between is not None:
+        dataset = xarray.concat([dataset, between], "time").sortby("time")
     times, arrays = dataset["time"].values, []
     for name, variable in dataset.data_vars.items():
         body = None if name == "energy" else str(name).removeprefix("energy_of_")
@@ -125,7 +131,9 @@ def _peaks(dataset: xarray.Dataset, order: int) -> list[dict[str, Any]]:
 
 def _of_robot(
     reading: RobotReading, file: Path, trajectory: Path | None, order: int, rates: int, *, drives: bool
-) -> xarray.Dataset:
+) -> tuple[xarray.Dataset, xarray.Dataset | None]:
+    """Return the energies at the instants of a trajectory, and between these, of a robot."""
+    from jounce.cli.robot_commands.robots import instants_between
     from jounce.dynamics.energy.energies import acceleration_energy
     from jounce.dynamics.limits.trajectories import FollowedTrajectory
 
@@ -133,10 +141,20 @@ def _of_robot(
     if trajectory is None:
         raise JounceError("a robot needs a trajectory: name it after the robot", name="trajectory", path=file)
     motion = reading.trajectory(trajectory, robot)
+
+    def energies_at(times: Any, named: Any) -> xarray.Dataset:
+        q = followed.coordinates(times, order + 1 + rates)
+        return _dataset(named, acceleration_energy(robot, q, order=order, drives=drives))
+
     with errors_about(trajectory, file):
-        q = FollowedTrajectory(robot, motion).coordinates(motion.times, order + 1 + rates)
-        energy = acceleration_energy(robot, q, order=order, drives=drives)
-    return _dataset(motion.times, energy)
+        followed = FollowedTrajectory(robot, motion)
+        dataset = energies_at(motion.times, motion.times)
+        times, named = instants_between(motion, order + 1 + rates)
+        if not len(times):
+            return dataset, None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SampleWarning)  # the message covers all instants
+            return dataset, energies_at(times, named)
 
 
 def _of_mechanism(reading: MechanismReading, file: Path, order: int, rates: int) -> xarray.Dataset:
