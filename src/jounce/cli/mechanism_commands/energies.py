@@ -98,8 +98,8 @@ def energies(
     if not json:
         times = dataset["time"].values
         title = "Kinetic energy" if order == 0 else f"Acceleration energy of order {order}"
-        places = count(len(times), "instant") + ("" if between is None else " and between them")
-        print_text(f"{title}, t = {interval_text(times[0], times[-1])}, at {places}")
+        counted = count(len(times), "instant") + ("" if between is None else " and between them")
+        print_text(f"{title}, t = {interval_text(times[0], times[-1])}, at {counted}")
         for row in extremes[: rates + 1]:
             name = "energy" if row["rate"] == 0 else f"rate {row['rate']}"
             print_text(f"  {name}: from {row['minimum']:.9g} to {row['maximum']:.9g} {row['unit']}")
