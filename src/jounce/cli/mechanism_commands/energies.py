@@ -133,8 +133,8 @@ def _of_robot(
     reading: RobotReading, file: Path, trajectory: Path | None, order: int, rates: int, *, drives: bool
 ) -> tuple[xarray.Dataset, xarray.Dataset | None]:
     """Return the energies at the instants of a trajectory, and between these, of a robot."""
-    from jounce.cli.robot_commands.robots import instants_between
     from jounce.dynamics.energy.energies import acceleration_energy
+    from jounce.dynamics.limits.check_limits import instants_between
     from jounce.dynamics.limits.trajectories import FollowedTrajectory
 
     robot = reading.robot(file)

@@ -174,6 +174,7 @@ def torques(
 
 def _torques_between(robot: Any, motion: Any, rates: int, loads: Any, *, drives: bool) -> Any:
     """Return the torques between the instants of a motion: at both sides of breaks, and densely if there are few."""
+    from jounce.dynamics.limits.check_limits import instants_between
     from jounce.dynamics.limits.trajectories import trajectory_torques
     from jounce.robot.algorithms.carried_loads import LoadedRobot
 
@@ -184,21 +185,6 @@ def _torques_between(robot: Any, motion: Any, rates: int, loads: Any, *, drives:
         warnings.simplefilter("ignore", SampleWarning)  # the message covers all instants
         torques_there = trajectory_torques(robot, motion, rates, times=times, drives=drives, loads=loads)
     return torques_there.assign_coords(time=named)
-
-
-def instants_between(motion: Any, order: int, changes: Any = ()) -> tuple[Any, Any]:
-    """Return instants between those of a motion, and those that they are named by: a break has one on each side."""
-    import numpy as np
-
-    from jounce.dynamics.limits.check_limits import fine_grid
-    from jounce.trajectory.law_checks.breaks import both_sides, distinct_instants, law_breaks
-
-    first, last = float(motion.times[0]), float(motion.times[-1])
-    breaks = distinct_instants(np.append(law_breaks(motion.laws.values(), first, last, order), changes), first, last)
-    sides, indices = both_sides(breaks, first, last)
-    grid = np.setdiff1d(fine_grid(motion, least=1), motion.times)
-    grid = grid[(grid > first) & (grid < last)]
-    return np.concatenate([sides, grid]), np.concatenate([breaks[indices], grid])
 
 
 def _smoothed(motion: Any, robot: Any, deviation: str | None, file: Path) -> Any:

@@ -20,7 +20,7 @@ from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.robot.model.links_and_joints import Joint, Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory.joint_trajectory import JointTrajectory
-from jounce.trajectory.law_checks.breaks import at_breaks, distinct_instants, law_breaks, with_sides
+from jounce.trajectory.law_checks.breaks import at_breaks, both_sides, distinct_instants, law_breaks, with_sides
 
 FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
 TURNING = dict(zip(FIELDS, ("rad", "rad/s", "rad/s^2", "rad/s^3", "N m", "N m/s"), strict=True))
@@ -351,6 +351,22 @@ def fine_grid(trajectory: JointTrajectory, least: int = BETWEEN) -> Float[np.nda
     steps = max(least, -(-INSTANTS // (len(instants) - 1)))
     evenly_spaced = instants[:-1, None] + np.diff(instants)[:, None] * (np.arange(steps) / steps)
     return np.append(evenly_spaced.reshape(-1), instants[-1])
+
+
+def instants_between(
+    trajectory: JointTrajectory, order: int, changes: ArrayLike = ()
+) -> tuple[Float[np.ndarray, " time"], Float[np.ndarray, " time"]]:
+    """Return instants between those of a trajectory, and those that they are named by.
+
+    A break of a derivative up to an order, and a change of a load, has an instant on each side.
+    """
+    first, last = float(trajectory.times[0]), float(trajectory.times[-1])
+    breaks = law_breaks(trajectory.laws.values(), first, last, order)
+    breaks = distinct_instants(np.append(breaks, changes), first, last)
+    sides, indices = both_sides(breaks, first, last)
+    grid = np.setdiff1d(fine_grid(trajectory, least=1), trajectory.times)
+    grid = grid[(grid > first) & (grid < last)]
+    return np.concatenate([sides, grid]), np.concatenate([breaks[indices], grid])
 
 
 def _checked_times(times: ArrayLike) -> Float[np.ndarray, " time"]:
