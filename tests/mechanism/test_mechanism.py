@@ -26,7 +26,7 @@ def mechanism(**changes):
 @pytest.mark.parametrize(
     "changes, message",
     [
-        ({"space": "plane"}, r"space.*planar or spatial.*'plane'"),
+        ({"space": "plane"}, r"^space: unknown space, got 'plane'; did you mean 'planar'"),
         ({"bodies": {}}, "at least one moving body"),
         ({"bodies": {"ground": jn.Body([0, 0])}}, r"bodies\.ground"),
         (
@@ -172,10 +172,14 @@ def test_what_is_no_vector_of_numbers(vector):
     [
         ("joints", [PIN], r"^joints: must be a dictionary, with a name for each entry, got \[Revolute\("),
         ("outputs", None, r"^outputs: must be a dictionary.*got nothing"),
+        ("space", np.array(["planar"]), r"^space: unknown space, got array\(.*valid: planar, spatial"),
+        ("title", ["Press"], r"^title: must be text, got \['Press'\]"),
+        ("assembly", np.array([1, 2]), r"^assembly: must be a number from 1, nearest, .*got array\(\[1, 2\]\)"),
+        ("redundant_reactions", np.array([1, 2]), r"^redundant_reactions: must be one of .*got array\(\[1, 2\]\)"),
         ("initial", {"a": "t"}, r"^initial\.a: must be one of the classes of drivers, got 't'"),
     ],
 )
-def test_what_is_no_dictionary_of_elements_is_refused_by_its_name(name, value, message):
+def test_fields_of_other_kinds_are_refused_by_their_names(name, value, message):
     given = mechanism()
     object.__setattr__(given, name, value)  # past the checks of types, which users do not have
     with pytest.raises(jn.errors.MechanismError, match=message):

@@ -76,6 +76,13 @@ def test_values_are_turned_into_si(raw, value):
     assert math.isclose(parse_value(raw).value, value, rel_tol=3e-16)
 
 
+@pytest.mark.parametrize("law", ["-2e3*v", "1e5*x", "2E3*v**3", "1e4*k*x", "2e3*k", "1e5/x", "1e2*e5"])
+def test_the_exponent_of_a_number_is_no_unit(law):
+    values = {"x": 0.5, "v": 0.25, "k": 3.0, "e5": 7.0}
+    read = parse_value(law, names=["k", "e5"], variables={"x": None, "v": None})
+    assert read.value.evaluate(values) == eval(law, {}, values)  # Python reads numbers in the same way
+
+
 @hypothesis.given(st.decimals(-1000, 1000, places=6))
 def test_decimal_sizes_lose_nothing(number):
     assert parse_value(f"{number} cm").value == float(number.scaleb(-2))
@@ -97,6 +104,7 @@ def test_decimal_sizes_lose_nothing(number):
         ("3 degC", "any", "has no fixed zero"),
         ("1e400 m", "length", "must be a finite number"),
         ("1e999999999 m", "length", "must be a finite number"),
+        ("1e400", "length", "a number too large at column 1"),
         ("1 light_year^99", "any", "unit out of range"),
         ("1 km^99*km^99", "any", "must be a finite number"),
         ("2 t", "angle", "a product needs its *, as in 2*t"),

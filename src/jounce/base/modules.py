@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, dataclass_transform,
 import jax
 import numpy as np
 
+from jounce.errors import MechanismError
+
 if TYPE_CHECKING:
 
     class Names:
@@ -33,8 +35,13 @@ _being_made: set[int] = set()  # identities of modules in `__init__`
 
 
 def as_names(given: str | Iterable[str]) -> tuple[str, ...]:
-    """Return one name or several as a tuple."""
-    return (given,) if isinstance(given, str) else tuple(given)
+    """Return one name of a body, or several in their order, as a tuple."""
+    if isinstance(given, str):
+        return (given,)
+    names = tuple(given) if isinstance(given, Iterable) and not isinstance(given, Set) else (None,)
+    if not all(isinstance(name, str) for name in names):
+        raise MechanismError("must be names of bodies in their order", name="bodies", value=given)
+    return names
 
 
 def field(*, static: bool = False, converter: Callable[[Any], Any] | None = None, **options: Any) -> Any:

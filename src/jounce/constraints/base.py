@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool
 
-from jounce.base.modules import Module, field
+from jounce.base.modules import Module, as_names, field
 from jounce.base.shapes import Numbers
 from jounce.constraints.facts import (
     USUAL_DIMENSIONS,
@@ -137,7 +137,7 @@ class AbstractConstraint(Module):
         permitted; or if its class states an impossible fact.
     """
 
-    bodies: tuple[str, ...] = field(static=True, converter=tuple)
+    bodies: tuple[str, ...] = field(static=True, converter=as_names)
 
     space: ClassVar[str] = ""
     role: ClassVar[str] = ""

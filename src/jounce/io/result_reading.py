@@ -6,7 +6,7 @@ import csv
 import io
 import warnings
 from collections import Counter
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from jounce.errors import OutputError
 from jounce.io.files.column_units import name_and_unit
-from jounce.io.files.reading import bad_line, is_result, known_name, read_file
+from jounce.io.files.reading import bad_line, is_result, known_name, name_of, read_file
 from jounce.io.hdf5_check import LONGEST, check_readable
 from jounce.io.result_columns import SUFFIXES, dataset_of
 from jounce.settings import under_own_settings
@@ -52,7 +52,7 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
     >>> motion["psi"].values.tolist(), motion["psi"].attrs["units"]
     ([[30.0, 2.0], [30.2, 2.0]], 'deg')
     """
-    name = fspath(path)
+    name = name_of(path, OutputError)
     suffix = Path(name).suffix.lower()
     if suffix not in SUFFIXES:
         raise OutputError(f"the kind of results is given by the extension; valid: {', '.join(SUFFIXES)}", path=name)

@@ -56,8 +56,9 @@ _ADVICE = {
     Status.INCONSISTENT: "redundant constraints contradict each other here: they agree at the start, and not all along "
     "the motion; correct lengths, axes and laws of those named, or free a direction there",
     Status.UNBALANCED: "the energy of the motion would change here, though nothing adds or removes any: a joint has a "
-    "kink or a jump, at which velocities would have to jump, too, or a feature too narrow for the steps; make its "
-    "residual smooth, or ask for a `longest_step` as short as the feature",
+    "kink or a jump, at which velocities would have to jump, too, or a feature too narrow for the steps, or the motion "
+    "runs into a singular position; make the residual smooth, ask for a `longest_step` as short as the feature, or "
+    "keep the motion away from that position",
     Status.END_OF_CURVE: "a point has come to an end of the curve that it is held on, and there is no curve beyond; "
     "ask for a shorter motion, or give a longer curve, or a closed one",
     Status.LOCKED: "no force or acceleration fulfills the law of friction, which grows as fast as the normal force on "

@@ -178,8 +178,9 @@ class Mechanism(Displayed):
     stated: frozenset[str] = dataclasses.field(default=frozenset(), compare=False, repr=False)
 
     def __post_init__(self):
-        if self.space not in ("planar", "spatial"):
-            raise MechanismError("space is planar or spatial", name="space", value=self.space)
+        check_choice("space", self.space, ("planar", "spatial"), MechanismError)
+        if not isinstance(self.title, str):
+            raise MechanismError("must be text", name="title", value=self.title)
         for name in MAPPINGS:
             if not isinstance(value := getattr(self, name), Mapping):
                 raise MechanismError("must be a dictionary, with a name for each entry", name=name, value=value)
@@ -247,7 +248,9 @@ class Mechanism(Displayed):
             for body, side in assembly.items():
                 check_name("body", body, tuple(self.bodies), MechanismError, name=f"assembly.{body}")
                 check_choice(f"assembly.{body}", side, tuple(SIDES), MechanismError)
-        elif assembly is not None and assembly != NEAREST and not (type(assembly) is int and assembly > 0):
+            return
+        named = isinstance(assembly, str) and assembly == NEAREST
+        if not (named or assembly is None or (type(assembly) is int and assembly > 0)):
             message = f"must be a number from 1, {NEAREST}, or for bodies one of {', '.join(SIDES)}"
             raise MechanismError(message, name="assembly", value=assembly)
 

@@ -19,7 +19,7 @@ RedundantReactions = str | Mapping[str, Any]
 def check_redundant_reactions(choice: RedundantReactions | Refused, names: Collection[str]) -> None:
     """Raise MechanismError unless the value is one of the choices, or stiffnesses by the names of joints."""
     if not isinstance(choice, Mapping):
-        if choice not in CHOICES:
+        if not isinstance(choice, str) or choice not in CHOICES:
             message = f"must be one of {', '.join(CHOICES)}, or stiffnesses by the names of joints"
             raise MechanismError(message, name=PLACE, value=choice)
         return

@@ -4,7 +4,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from jounce.design.tolerances.design_space import sample_space
 from jounce.design.tolerances.variations import read_variations
 from jounce.errors import DamageWarning, JounceError, MechanismError, OutputError, TrajectoryError, whole_number
 from jounce.integrate.steps.methods import AbstractMethod
-from jounce.io.files.reading import recording
+from jounce.io.files.reading import name_of, recording
 from jounce.mechanism import Mechanism
 from jounce.mechanism.time import TimeLike
 from jounce.robot.robot import Robot
@@ -130,7 +130,9 @@ def sweep(
     """
     with recording() as files:
         problem, title = _problem(model, trajectory, time, order, simulate, method, tolerance)
-    prepared = prepare(problem, vary, Path(fspath(out)), title, files, sample=sample, histories=histories, chunk=chunk)
+    prepared = prepare(
+        problem, vary, Path(name_of(out, OutputError)), title, files, sample=sample, histories=histories, chunk=chunk
+    )
     with Count("sweeping", "designs", progress) as tell:
         run(prepared, workers=workers, scheduler=scheduler, timeout=timeout, progress=tell)
     return opened(prepared.folder)

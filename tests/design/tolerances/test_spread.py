@@ -10,6 +10,7 @@ from jounce.cli import main
 from jounce.design.tolerances.spread import column_of
 from jounce.errors import JounceError
 from jounce.plot import draw_bands
+from jounce.reporting.facts.spread_facts import columns_of
 
 TIME = np.linspace(0.0, 2.0, 9)
 L, K = 0.2, 1.5
@@ -120,6 +121,8 @@ def test_the_command_tells_what_matters_and_draws_it(crank, tmp_path, capsys, sp
     Draft202012Validator(result_schema()).validate(result)
     columns = [(x["output"], x["derivative"]) for x in result["spread"]]
     assert columns == [("tip_x", 0), ("tip_x", 2), ("tip_y", 2), ("angle", 0)]
+    every = [(name, label, k) for name, label in (("tip", "x"), ("tip", "y"), ("angle", "")) for k in range(3)]
+    assert columns_of(spread, None) == every  # one component after the other, as in other tables
     assert len(draw_bands(spread, [("tip", "y", 2), ("angle", "", 0)]).axes) == 6
 
 
@@ -164,6 +167,7 @@ def test_columns_have_names(crank):
         ({"vary": {}}, "say what varies"),
         ({"of": ["tap"]}, "did you mean 'tip'"),
         ({"samples": -1}, "whole number"),
+        ({"samples": 0, "linear": False}, "^samples: nothing is left to compute, got 0; .*give samples"),
         ({"samples": 100, "indices": True}, "power of two"),
     ],
 )

@@ -76,6 +76,30 @@ def test_units_in_names_alone_are_not_taken_for_those_of_si(tmp_path, names, sai
         read_samples(path, allowed=allowed)
 
 
+@pytest.mark.parametrize(
+    "row, size", [("ms,mm", 1e-3), ("[ms],(mm)", 1e-3), ("ms , cm", 1e-2), ("ms,", 1.0), ("ms,-", 1.0), ("ms,rad", 1.0)]
+)
+def test_a_row_of_units_below_the_names_is_read(tmp_path, row, size):
+    path = write(tmp_path, f"time,lift\n{row}\n0,1\n500,2.5\n")
+    assert read_samples(path, allowed=([TIME], [LENGTH, ANGLE])) == ([0.0, 0.5], [1.0 * size, 2.5 * size])
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("time,lift\nms,kg\n0,1\n", "line 2, lift: the unit measures a mass, not a length or an angle, got 'kg'"),
+        ("time,lift\nms,mmm\n0,1\n", "line 2, time: must be a finite number, got 'ms'"),
+        ("time [ms],lift\nms,mm\n0,1\n", "line 2, time: must be a finite number, got 'ms'"),
+        ("time,lift\nms,2\n0,1\n", "line 2, time: must be a finite number, got 'ms'"),
+    ],
+)
+def test_rows_that_state_no_units_of_the_columns_are_refused(tmp_path, text, said):
+    path = write(tmp_path, text)
+    with pytest.raises(MechanismFileError) as caught:
+        read_samples(path, value="lift", allowed=([TIME], [LENGTH, ANGLE]))
+    assert said in str(caught.value)
+
+
 def test_files_that_cannot_be_read(tmp_path, monkeypatch):
     with pytest.raises(MechanismFileError, match="file of samples not found"):
         read_samples(tmp_path / "no.csv")

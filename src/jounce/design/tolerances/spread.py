@@ -114,6 +114,9 @@ def tolerance(
         check_name("parameter", name, mechanism.parameters, MechanismError, name="vary")
     spreads(variations)
     samples = whole_number("samples", samples, 0, error=MechanismError)
+    if not (samples or linear):
+        message = "nothing is left to compute; take gradients, or give samples, two or more"
+        raise MechanismError(message, name="samples", value=samples)
     if indices:
         check_salib(samples)
     selected = tuple(mechanism.outputs)

@@ -35,6 +35,14 @@ _results: dict[str, tuple[int, ...]] = {}
 """Device, inode, size and time of the files written by this process, by their real paths."""
 
 
+def name_of(path: str | PathLike[str], error: type[JounceError] = MechanismFileError) -> str:
+    """Return the name of a file as text, or raise an error of the given type."""
+    try:
+        return os.fsdecode(path)
+    except TypeError:
+        raise error("must be the name of a file", name="path", value=path) from None
+
+
 def read_file(
     path: str | PathLike[str],
     limit: int | None = MAX_BYTES,

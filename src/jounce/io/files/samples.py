@@ -26,6 +26,9 @@ COMMENT = "# "
 ROW_NUMBER = "(row)"
 """Name for an unnamed first column of row numbers, as pandas writes it; it is not read."""
 
+UNITLESS = ("", "-")
+"""Entries of a row of units for columns without one."""
+
 _RATE = re.compile(r"_d([0-9]{1,2})$")
 
 
@@ -251,12 +254,22 @@ class Table:
         if any(_number(entry) is None for entry in self.rows[0][1]):
             self.header_line, names = self.rows.pop(0)
             self._name(names)
+            self._take_row_of_units()
             self._name_index()
 
     def _name(self, names: Sequence[str]) -> None:
         names = [names[0].lstrip(COMMENT), *names[1:]]
         pairs = [name_and_unit(known_name(name)) for name in names]
         self.header, self.units = [name for name, _ in pairs], [unit for _, unit in pairs]
+        self.units_line = self.header_line
+
+    def _take_row_of_units(self) -> None:
+        """Take the units of columns from the row below the names, if it has no numbers and the names no units."""
+        line, row = self.rows[0] if self.rows else (0, [])
+        units = [entry.strip("[]() ") for entry in row]
+        if len(row) == len(self.header) and not any(self.units) and all(_is_unit(unit) for unit in units):
+            self.units, self.units_line = [None if unit in UNITLESS else unit for unit in units], line
+            del self.rows[0]
 
     def _name_index(self) -> None:
         """Name an unnamed first column, the index that pandas writes: row numbers, or the times."""
@@ -319,7 +332,7 @@ class Table:
                 message = f"this name seems to say {unit_text}; {hint}"
                 raise self.error(message, line=self.header_line, value=name)
             return 1.0, NUMBER
-        location = {"line": self.header_line, "name": name, "value": unit}
+        location = {"line": self.units_line, "name": name, "value": unit}
         try:
             size, dimension = unit_size(unit)
         except UnitError as error:
@@ -365,6 +378,16 @@ def _without_empty_end(rows: list[tuple[int, list[str]]]) -> list[tuple[int, lis
     if any(len(row) < 2 or len(row) != len(rows[0][1]) or row[-1] for _, row in rows):
         return rows
     return [(line, row[:-1]) for line, row in rows]
+
+
+def _is_unit(text: str) -> bool:
+    """Return whether an entry of a row of units states a unit, or that there is none."""
+    if text in UNITLESS:
+        return True
+    try:
+        return _number(text) is None and bool(unit_size(text))
+    except UnitError:
+        return False
 
 
 def _number(text: str) -> float | None:

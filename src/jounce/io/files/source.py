@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 
 from jounce.errors import JounceError, MechanismFileError
 from jounce.io.files import DATA_FILES, parsers
 from jounce.io.files.located_data import Source
-from jounce.io.files.reading import check_allowed, read_file
+from jounce.io.files.reading import check_allowed, name_of, read_file
 
 MAX_LINES = 1_000_000
 LINES = (".jsonl", ".ndjson")
@@ -76,7 +76,7 @@ def read_source(
         Of the given type, if the file cannot be read, violates the syntax, has a duplicate name, or exceeds a limit on
         size or nesting.
     """
-    name = str(fspath(path))
+    name = name_of(path, error_type)
     if not name:
         raise error_type("the name of a file is needed", value=name)
     suffix = Path(name).suffix.lower()

@@ -17,7 +17,7 @@ from typing import Any
 
 from jounce.base.interrupts import cleanup_on_signal
 from jounce.errors import OutputError
-from jounce.io.files.reading import is_input, note_result, reason_of
+from jounce.io.files.reading import is_input, name_of, note_result, reason_of
 
 _scratches: set[Path] = set()
 """Temporary files that have not yet replaced their targets."""
@@ -44,7 +44,7 @@ def check_target(
     OutputError
         If the ending is not permitted, the folder does not exist, the file is an input, or it cannot be written.
     """
-    name = fspath(path)
+    name = name_of(path, OutputError)
     if suffixes and Path(name).suffix.lower() not in suffixes:
         raise OutputError(f"the kind of {kind} is given by its extension; valid: {', '.join(suffixes)}", path=name)
     try:

@@ -6,11 +6,11 @@ import importlib.util
 import os
 import sys
 import zlib
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 
 from jounce.errors import JounceError, MechanismFileError
-from jounce.io.files.reading import read_file
+from jounce.io.files.reading import name_of, read_file
 
 
 def import_file(path: str | PathLike[str]) -> None:
@@ -26,7 +26,7 @@ def import_file(path: str | PathLike[str]) -> None:
     MechanismFileError
         If there is no such file, or running it fails: the message names the line.
     """
-    name = fspath(path)
+    name = name_of(path)
     if not name.endswith(".py"):
         raise MechanismFileError("own joints come from a Python file, ending in .py", path=name)
     read_file(name)

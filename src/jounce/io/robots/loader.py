@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 
 from jounce.errors import RobotFileError, UnitWarning, warn_caller
 from jounce.io.files import ROBOT_FILES
-from jounce.io.files.reading import check_allowed
+from jounce.io.files.reading import check_allowed, name_of
 from jounce.io.robots.closure_files import with_closures
 from jounce.io.robots.elements.faults import FEW, MACROS, Faults
 from jounce.io.robots.elements.xml_elements import Element, read_markup
@@ -92,8 +92,7 @@ def load_robot(
     >>> robot.limits["quill"].effort
     220.0
     """
-    name = fspath(path)
-    name = name if isinstance(name, str) else str(name)
+    name = name_of(path, RobotFileError)
     if not name:
         raise RobotFileError("the name of a file is needed", value=name)
     suffix = Path(name).suffix.lower()

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 
 from jounce.errors import TrajectoryError, check_name
 from jounce.io.files import DATA_FILES
+from jounce.io.files.reading import name_of
 from jounce.io.files.source import LINES, read_source
 from jounce.io.trajectories.law_files import LawFile
 from jounce.io.trajectories.recorded_trajectories import trajectory_of
@@ -118,8 +119,8 @@ def load_trajectory(
     if isinstance(recording, LawFile):
         if as_controller:
             message = "contains laws, which no controller interpolates; give points or samples"
-            raise TrajectoryError(message, path=str(fspath(path)), name="as_controller")
-        return _selected_laws(recording.trajectory(), chosen, str(fspath(path)))
+            raise TrajectoryError(message, path=str(path), name="as_controller")
+        return _selected_laws(recording.trajectory(), chosen, str(path))
     if robot is not None and recording.unnamed:
         recording = _named_by(recording, robot)
     if chosen is None and joints is None and not recording.unnamed:
@@ -150,7 +151,7 @@ def load_recording(
     topic: str | None = None,
 ) -> Recording | LawFile:
     """Return the source of `load_trajectory`: rows of a recording, or laws."""
-    name = str(fspath(path))
+    name = name_of(path, TrajectoryError)
     given = None if joints is None else tuple(joints)
     if is_bag(name):
         return read_bag(name, given, topic)

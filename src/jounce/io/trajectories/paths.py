@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path as FilePath
 from typing import Any
 
 from jounce.errors import JounceError, TrajectoryError
 from jounce.io.files import DATA_FILES
+from jounce.io.files.reading import name_of
 from jounce.io.files.samples import has_column, read_table
 from jounce.io.files.source import read_source
 from jounce.io.trajectories.loader import load_trajectory
@@ -56,7 +57,7 @@ def load_path(
     TrajectoryError
         If the file cannot be read or contains an error: the message names the file, and the line or the entry.
     """
-    name = str(fspath(path))
+    name = name_of(path, TrajectoryError)
     suffix = FilePath(name).suffix.lower()
     if suffix == ".csv" and not has_column(name, TIMES):
         columns = read_table(name)

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.constraints import AbstractConstraint
+from jounce.errors import MechanismError
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
@@ -22,6 +23,10 @@ from jounce.mechanism.transmissions.axis_angles import angles_of, of_one_lane, w
 
 def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
     """Raise MechanismError if an output names missing elements, or does not exist in the space of the mechanism."""
+    if not isinstance(output, AbstractQuantity):
+        known = isinstance(output, str) and output in mechanism.outputs
+        advice = f"; motion.outputs['{output}'] has the values of this one" if known else ""
+        raise MechanismError(f"must be an output, such as jn.outputs.PointOutput{advice}", name=name, value=output)
     mechanism.check_fit(output, name)
     output.check(mechanism)
 

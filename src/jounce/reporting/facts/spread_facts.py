@@ -22,13 +22,21 @@ def columns_of(spread: xarray.Dataset, selection: Sequence[Column] | None) -> li
     """Return the requested columns, one for each component; by default all columns of the outputs."""
     outputs = [str(name) for name in spread.data_vars if f"{name}_peak" in spread.data_vars]
     levels = [int(order) for order in spread["derivative"].values]
-    selected = [(name, "", order) for name in outputs for order in levels] if selection is None else list(selection)
-    columns = []
-    for name, component, order in selected:
-        axes = [dim for dim in spread[name].dims if dim not in ("time", "derivative")]
-        labels = ["".join(map(str, x)) for x in itertools.product(*(spread[axis].values for axis in axes))]
-        columns += [(name, label, order) for label in labels if component in ("", label)]
+    if selection is None:
+        return [(name, label, order) for name in outputs for label in _labels(spread[name]) for order in levels]
+    columns = [
+        (name, label, order)
+        for name, component, order in selection
+        for label in _labels(spread[name])
+        if component in ("", label)
+    ]
     return list(dict.fromkeys(columns))
+
+
+def _labels(values: xarray.DataArray) -> list[str]:
+    """Return the labels of the components of an output; an empty one for a scalar."""
+    axes = [dim for dim in values.dims if dim not in ("time", "derivative", "parameter")]
+    return ["".join(map(str, x)) for x in itertools.product(*(values[axis].values for axis in axes))]
 
 
 def spread_facts(spread: xarray.Dataset, columns: Sequence[Column]) -> dict[str, Any]:
@@ -76,7 +84,7 @@ def chosen(spread: xarray.Dataset, variable: str, column: Column) -> np.ndarray:
     _, component, order = column
     data = spread[variable].sel(derivative=order)
     axes = [dim for dim in data.dims if dim not in ("time", "parameter")]
-    labels = ["".join(map(str, x)) for x in itertools.product(*(data[axis].values for axis in axes))]
+    labels = _labels(data)
     dims = [dim for dim in ("parameter", "time") if dim in data.dims]
     values = data.transpose(*axes, *dims).values
     return np.asarray(values.reshape(-1, *values.shape[len(axes) :])[labels.index(component)])

@@ -17,6 +17,7 @@ from jounce.dynamics.inverse.outputs.components import (
     is_turning,
 )
 from jounce.dynamics.motion_values import check_motion
+from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Motion
 from jounce.mechanism.redundant_reactions import RedundantReactions
 
@@ -66,8 +67,9 @@ def driver_force(motion: Motion, name: str, *, redundant: RedundantReactions | N
     ([[24.0, 24.0, 12.0]], 'N*m')
     """
     check_motion(motion)
-    driver = motion.mechanism.drivers.get(name)
-    kind = DriverTorqueOutput if driver is not None and is_turning(driver) else DriverForceOutput
+    drivers = motion.mechanism.drivers
+    check_name("driver", name, drivers, MechanismError, name="driver")
+    kind = DriverTorqueOutput if is_turning(drivers[name]) else DriverForceOutput
     return _with_choice_of_reactions(motion, redundant).evaluate(kind(name), name)
 
 

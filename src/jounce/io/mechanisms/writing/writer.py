@@ -23,6 +23,7 @@ from jounce.io.mechanisms.writing.written_values import plain, plain_number
 from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
 from jounce.mechanism.building.preconditions import concrete
 from jounce.mechanism.laws.cam_laws import leader_name
+from jounce.mechanism.mechanism import check_mechanism
 from jounce.mechanism.outputs.derivative_outputs import form_of
 from jounce.settings import under_own_settings
 from jounce.units.dimensions import si_unit
@@ -66,6 +67,7 @@ def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrit
     from jounce.io.files.dumping import dumped
     from jounce.io.files.writing import check_target, replacing
 
+    check_mechanism(mechanism)
     check_target(path, DATA_FILES, "mechanism file", overwrite=overwrite)
     data, samples = mechanism_data(mechanism, Path(path).stem)
     text = dumped(data, Path(path).suffix.lower(), str(path))
