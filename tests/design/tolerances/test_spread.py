@@ -166,6 +166,7 @@ def test_columns_have_names(crank):
         ({"vary": {"L": "normal:1 kg"}}, "this is a mass"),
         ({"vary": {}}, "say what varies"),
         ({"of": ["tap"]}, "did you mean 'tip'"),
+        ({"of": "tap"}, "got 'tap'; did you mean 'tip'"),  # one name, not its letters
         ({"samples": -1}, "whole number"),
         ({"samples": 0, "linear": False}, "^samples: nothing is left to compute, got 0; .*give samples"),
         ({"samples": 100, "indices": True}, "power of two"),

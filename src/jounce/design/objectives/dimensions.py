@@ -3,7 +3,7 @@
 from jounce.design.objectives.language import EXERTED, MEASURES, OVER_TIME, Node, Relation
 from jounce.design.objectives.quantities import Quantities
 from jounce.errors import UnitError
-from jounce.units.dimensions import LENGTH, TIME, Dimension, times
+from jounce.units.dimensions import LENGTH, TIME, Dimension, describe_dimension, times
 from jounce.units.values import parse_unit
 
 
@@ -12,8 +12,11 @@ def check_dimensions(relation: Relation, quantities: Quantities) -> None:
     sides = relation.left, relation.right
     dimensions = [x or _dimension(side, quantities) for x, side in zip(relation.dimensions, sides, strict=True)]
     if any(relation.dimensions) and None not in dimensions and dimensions[0] != dimensions[1]:
-        measure, unit = (side.text for side in (sides if relation.dimensions[1] else sides[::-1]))
-        raise UnitError(f"{measure} cannot have the unit of what it is compared with, which is {unit} in SI units")
+        (measure, is_of), (bound, other) = list(zip(sides, dimensions, strict=True))[
+            :: 1 if relation.dimensions[1] else -1
+        ]
+        message = f"{measure.text} is {describe_dimension(is_of)}, and is compared with {describe_dimension(other)}"
+        raise UnitError(f"{message}, {bound.text} in SI units")
 
 
 def _dimension(node: Node, quantities: Quantities) -> Dimension | None:

@@ -65,7 +65,7 @@ def tolerance(
         Instants, s; by default those of the mechanism.
     order : int, default 4
         Highest derivative, unless `of` is given.
-    of : sequence of str, optional
+    of : str or sequence of str, optional
         Names of the columns to compute: ``"psi"``, ``"psi_d3"``, ``"C_x_d2"``; all by default.
     samples : int, default 1024
         Number of designs to solve; powers of two fill the ranges best. 0 omits the Monte Carlo method.
@@ -121,7 +121,7 @@ def tolerance(
         check_salib(samples)
     selected = tuple(mechanism.outputs)
     if of is not None:
-        chosen = [column_of(mechanism, name) for name in of]
+        chosen = [column_of(mechanism, name) for name in ((of,) if isinstance(of, str) else of)]
         order = max((atom[2] for atom in chosen), default=0)
         outputs = {name: output for name, output in mechanism.outputs.items() if name in {c[0] for c in chosen}}
         selected, mechanism = tuple(outputs), with_outputs(mechanism, outputs)
@@ -154,8 +154,8 @@ def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
     >>> column_of(jn.load("examples/four_bar.yaml"), "C_x_d3")
     ('C', 'x', 3)
     """
-    stem, _, digits = name.rpartition("_d")
-    stem_name, order = (stem, int(digits)) if stem and digits.isdecimal() and len(digits) < 3 else (name, 0)
+    stem, _, digits = str(name).rpartition("_d")
+    stem_name, order = (stem, int(digits)) if stem and digits.isdecimal() and len(digits) < 3 else (str(name), 0)
     for output, quantity in mechanism.outputs.items():
         if stem_name == output:
             return output, "", order
