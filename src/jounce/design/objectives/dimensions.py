@@ -12,9 +12,8 @@ def check_dimensions(relation: Relation, quantities: Quantities) -> None:
     sides = relation.left, relation.right
     dimensions = [x or _dimension(side, quantities) for x, side in zip(relation.dimensions, sides, strict=True)]
     if any(relation.dimensions) and None not in dimensions and dimensions[0] != dimensions[1]:
-        (measure, is_of), (bound, other) = list(zip(sides, dimensions, strict=True))[
-            :: 1 if relation.dimensions[1] else -1
-        ]
+        step = 1 if relation.dimensions[1] else -1  # the side with a unit comes last
+        (measure, is_of), (bound, other) = list(zip(sides, dimensions, strict=True))[::step]
         message = f"{measure.text} is {describe_dimension(is_of)}, and is compared with {describe_dimension(other)}"
         raise UnitError(f"{message}, {bound.text} in SI units")
 

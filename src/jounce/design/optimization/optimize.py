@@ -153,7 +153,7 @@ def _bounds(mechanism: Mechanism, vary: Mapping[str, Any]) -> dict[str, tuple[fl
         If a parameter does not exist, or its bounds are not two increasing numbers or not admissible.
     """
     if not isinstance(vary, Mapping) or not vary:
-        raise MechanismError("must be bounds by the names of parameters, at least one", name="vary", value=vary)
+        raise MechanismError("must be the bounds of at least one parameter, by its name", name="vary", value=vary)
     bounds = {}
     for name, pair in vary.items():
         check_name("parameter", name, mechanism.parameters, MechanismError, name="vary")
