@@ -38,8 +38,9 @@ def as_names(given: str | Iterable[str]) -> tuple[str, ...]:
     """Return one name of a body, or several in their order, as a tuple."""
     if isinstance(given, str):
         return (given,)
-    names = tuple(given) if isinstance(given, Iterable) and not isinstance(given, Set) else (None,)
-    if not all(isinstance(name, str) for name in names):
+    ordered = isinstance(given, Iterable) and not isinstance(given, Set)
+    names = tuple(given) if ordered else ()
+    if not ordered or not all(isinstance(name, str) for name in names):
         raise MechanismError("must be names of bodies in their order", name="bodies", value=given)
     return names
 

@@ -10,12 +10,14 @@ from jounce.units.values import parse_unit
 def check_dimensions(relation: Relation, quantities: Quantities) -> None:
     """Raise UnitError if one side has a unit that the other cannot have."""
     sides = relation.left, relation.right
-    dimensions = [x or _dimension(side, quantities) for x, side in zip(relation.dimensions, sides, strict=True)]
-    if any(relation.dimensions) and None not in dimensions and dimensions[0] != dimensions[1]:
-        step = 1 if relation.dimensions[1] else -1  # the side with a unit comes last
-        (measure, is_of), (bound, other) = list(zip(sides, dimensions, strict=True))[::step]
-        message = f"{measure.text} is {describe_dimension(is_of)}, and is compared with {describe_dimension(other)}"
-        raise UnitError(f"{message}, {bound.text} in SI units")
+    left, right = (x or _dimension(side, quantities) for x, side in zip(relation.dimensions, sides, strict=True))
+    if any(relation.dimensions) and left is not None and right is not None and left != right:
+        measured, stated = zip(sides, (left, right), strict=True)
+        if not relation.dimensions[1]:
+            measured, stated = stated, measured
+        message = f"{measured[0].text} is {describe_dimension(measured[1])}"
+        other = f"{describe_dimension(stated[1])}, {stated[0].text} in SI units"
+        raise UnitError(f"{message}, and is compared with {other}")
 
 
 def _dimension(node: Node, quantities: Quantities) -> Dimension | None:
