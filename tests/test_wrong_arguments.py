@@ -30,6 +30,9 @@ SAID = {
     "jn.outputs.PointOutput(None, [0, 0])": f"{BODIES}nothing",
     "motion.angle(5)": f"{BODIES}5",
     "jn.driver_force(motion, ['theta'])": "driver: no driver has this name, got ['theta']; did you mean 'theta'?",
+    "jn.dynamics.applied_force(motion, ['spring'])": "force: no force has this name, got ['spring']; none is defined",
+    "jn.plot.draw(None)": "motion: must be a jn.Motion, as jn.solve and jn.simulate give it, got nothing",
+    "jn.plot.draw(motion, 'pis')": "outputs: no output has this name, got 'pis'; did you mean 'psi'?",
     "motion.evaluate('psi')": f"{OUTPUT}'psi'; motion.outputs['psi']",
     "motion.evaluate(None)": f"{OUTPUT}nothing",
 }

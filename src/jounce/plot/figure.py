@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.dynamics.motion_values import check_motion
 from jounce.errors import MechanismError, check_name
 from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Motion
@@ -33,14 +34,14 @@ LEGEND = {"borderaxespad": 0.1, "handlelength": 1.2, "handletextpad": 0.5, "colu
 STROKES = ("-", "--", ":")  # for more components than colors
 
 
-def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Figure:
+def draw(motion: Motion, outputs: str | Sequence[str] | None = None) -> Figure:
     r"""Draw outputs of a motion and their derivatives over time.
 
     Parameters
     ----------
     motion : Motion
         The motion; unsolved instants are omitted and shaded.
-    outputs : sequence of str, optional
+    outputs : str or sequence of str, optional
         Names of the outputs; all by default.
 
     Returns
@@ -62,9 +63,11 @@ def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Figure:
     >>> [axes.get_ylabel() for axes in figure.axes][2]
     'acceleration\n$\\ddot{\\psi}$  (rad/s$^2$)'
     """
-    for name in outputs or ():
+    check_motion(motion)
+    chosen = (outputs,) if isinstance(outputs, str) else outputs or ()
+    for name in chosen:
         check_name("output", name, motion.outputs, MechanismError, name="outputs")
-    names = dict.fromkeys(outputs or motion.outputs)
+    names = dict.fromkeys(chosen or motion.outputs)
     if not names:
         raise MechanismError("there is nothing to draw; name some outputs", name="outputs")
     return draw_columns(motion, {name: (motion.mechanism.outputs[name], motion.outputs[name]) for name in names})

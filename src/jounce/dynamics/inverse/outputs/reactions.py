@@ -249,6 +249,7 @@ def applied_force(motion: Motion, name: str) -> "xarray.DataArray":
     [[20.0, 20.0, 10.0]]
     """
     check_motion(motion)
-    force = motion.mechanism.forces.get(name)
-    kind = AppliedTorqueOutput if force is not None and force.unit != "N" else AppliedForceOutput
+    forces = motion.mechanism.forces
+    check_name("force", name, forces, MechanismError, name="force")
+    kind = AppliedForceOutput if forces[name].unit == "N" else AppliedTorqueOutput
     return motion.evaluate(kind(name), name)
