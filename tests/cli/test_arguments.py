@@ -59,6 +59,10 @@ def test_the_second_file_too(run):
     assert "is a mechanism" in run("check", PANDA, FOUR_BAR)[2]
     assert "holds limits" in run("check", PANDA, LIMITS)[2]
     assert "is a trajectory" in run("check", PANDA, GOOD, "--limits", WAVE)[2]
+    assert (
+        f"{PANDA}: is a robot, whose own limits count without --limits"
+        in run("check", PANDA, GOOD, "--limits", PANDA)[2]
+    )
 
 
 @pytest.mark.parametrize("given, kind", [(PANDA, "robot"), (FOUR_BAR, "mechanism")])

@@ -99,4 +99,6 @@ def explaining_other_kinds(path: str | PathLike[str], *kinds: str) -> Iterator[N
         advice = ADVICE[kind].format(path=path, stem=Path(fspath(path)).stem)
         if kinds == ("trajectory",) and kind in ("mechanism", "robot"):
             advice = f"is a {kind}; a trajectory is needed: times and positions of joints (.csv), or laws of joints"
+        if kinds == ("limits",) and kind == "robot":
+            advice = "is a robot, whose own limits count without --limits; a file of limits is needed here (.yaml)"
         raise type(error)(advice, path=path) from None

@@ -8,6 +8,8 @@ from jsonschema import Draft202012Validator
 
 import jounce as jn
 from jounce.cli import main
+from jounce.cli.robot_commands.retiming import deviation_of
+from jounce.errors import UnitWarning
 from jounce.reporting.json.result_schema import result_schema
 
 
@@ -35,6 +37,15 @@ def test_a_log_is_smoothed_written_and_read(tmp_path, capsys):
         capsys.readouterr()
         assert main([command[0], robot, str(log), "--deviation", "0.1mm", *command[1:]]) == 2
         assert "--deviation: must be an angle, such as 0.1deg: all joints turn, got '0.1mm'" in capsys.readouterr().err
+
+
+def test_deviations_that_are_likely_in_degrees_are_warned_of():
+    for text, value in (("5 deg", np.pi / 36), ("300mm", 0.3), ("0.05", 0.05)):
+        assert np.isclose(deviation_of(text), value, rtol=1e-15)
+    with pytest.warns(UnitWarning, match=r"--deviation: 5 rad or m, since .*; write a unit, such as 5deg or 5mm"):
+        assert deviation_of("5") == 5.0
+    with pytest.warns(UnitWarning, match=r"0.5 rad, since .*; write a unit, such as 0.5deg$"):
+        deviation_of("0.5", jn.load_robot("examples/robots/ur5.urdf"))
 
 
 def test_a_smoothed_log_is_reported_as_json_and_drawn(tmp_path, capsys):

@@ -21,7 +21,7 @@ from jounce.cli.options import (
 )
 from jounce.cli.robot_commands.joint_tables import joint_table
 from jounce.cli.robot_commands.servo import frequency_of
-from jounce.errors import JounceError, SampleWarning
+from jounce.errors import JounceError, SampleWarning, UnitWarning, warn_caller
 from jounce.io.files import DATA_FILES
 from jounce.reporting.terminal import print_text, show_table
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
     from jounce.planning import RetimedTrajectory
     from jounce.robot import Robot
+
+DOUBTFUL = 0.1  # rad or m: a larger deviation without a unit is likely in degrees or millimeters
 
 
 def retime(
@@ -151,7 +153,7 @@ def retime(
 
 
 def deviation_of(text: str, robot: Robot | None = None) -> float:
-    """Return the deviation in a text, an angle or a length, rad or m."""
+    """Return the deviation in a text, an angle or a length, rad or m, with a UnitWarning if its unit is in doubt."""
     from jounce.units.dimensions import ANGLE, LENGTH
 
     allowed, noun = (ANGLE, LENGTH), "an angle or a length, such as 0.1deg or 1mm"
@@ -160,7 +162,13 @@ def deviation_of(text: str, robot: Robot | None = None) -> float:
         allowed, noun = (ANGLE,), "an angle, such as 0.1deg: all joints turn"
     elif moving_joints and all(joint.type == "prismatic" for joint in moving_joints):
         allowed, noun = (LENGTH,), "a length, such as 1mm: all joints slide"
-    return positive_quantity("--deviation", text, allowed, noun)
+    deviation = positive_quantity("--deviation", text, allowed, noun)
+    if deviation >= DOUBTFUL and text.strip()[-1] in ".0123456789":
+        units = " or ".join(unit for unit, dimension in (("rad", ANGLE), ("m", LENGTH)) if dimension in allowed)
+        message = f"{deviation:g} {units}, since a number without a unit is in SI; write a unit, such as"
+        smaller = " or ".join(f"{deviation:g}{'deg' if unit == 'rad' else 'mm'}" for unit in units.split(" or "))
+        warn_caller(UnitWarning(f"--deviation: {message} {smaller}"))
+    return deviation
 
 
 def duration_of(text: str) -> float:
