@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
+
+import numpy as np
 
 from jounce.errors import RobotFileError, UnitWarning, warn_caller
 from jounce.io.files import ROBOT_FILES
@@ -23,6 +25,7 @@ SHAPES = ("visual", "collision")
 XACRO_SOURCE = ("xacro:include", "xacro:macro", "xacro:property", "xacro:arg", "xacro:if", "xacro:unless")
 OLD_XACRO = ("include", "macro", "property")  # tags of xacro before it had a prefix
 LEAST_DEGREES = 45  # rad, more than seven turns: smaller ranges are not taken for degrees
+WIDE = 20.0  # radii of gyration of published robots are up to 16 times the reach, those of kg mm^2 some 300
 XACRO = "is a xacro file, which must first be expanded to a URDF; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
@@ -122,6 +125,7 @@ def load_robot(
     if (warning := faults.warning()) is not None:
         warnings.warn(warning, stacklevel=2)
     _warn_of_degrees(robot, name)
+    _warn_of_wide_inertias(robot, name)
     if closures is not None:
         robot = with_closures(robot, closures)
     if floating_base is False:
@@ -140,11 +144,28 @@ def _warn_of_degrees(robot: Robot, path: str) -> None:
         is_round = lower % 5 == 0 and upper % 5 == 0 and (lower % 50 != 0 or upper % 50 != 0)  # 100 stands for no limit
         if is_round and LEAST_DEGREES <= max(abs(lower), abs(upper)) <= 360:
             doubtful.append(f"{joint.name} ({lower:g} to {upper:g})")
+    _warn_of_units("these ranges of joints look like degrees, and are read as radians", doubtful, "write radians", path)
+
+
+def _warn_of_wide_inertias(robot: Robot, path: str) -> None:
+    """Warn of links whose mass would lie much farther out than any joint or center of mass, as with kg mm^2."""
+    inertias = {name: link.inertia for name, link in robot.links.items() if link.inertia is not None}
+    vectors = [*(joint.position for joint in robot.joints.values()), *(x.center_of_mass for x in inertias.values())]
+    reach = max((float(np.linalg.norm(vector)) for vector in vectors), default=0.0)
+    doubtful = []
+    for name, inertia in inertias.items():
+        radius = np.sqrt(np.abs(inertia.tensor).max() / inertia.mass) if inertia.mass > 0 else 0.0
+        if robot.moving_joints and reach > 0 and radius > max(1.0, WIDE * reach):
+            doubtful.append(f"{name} ({radius:.3g} m)")
+    message = f"these links have moments of inertia as if their mass were this far out, where all lies in {reach:.3g} m"
+    _warn_of_units(message, doubtful, "write kg m^2", path)
+
+
+def _warn_of_units(message: str, doubtful: Sequence[str], advice: str, path: str) -> None:
     if doubtful:
         excess = len(doubtful) - FEW
         phrase = ", ".join(doubtful if excess <= 0 else [*doubtful[:FEW], f"and {excess} more"])
-        message = f"these ranges of joints look like degrees, and are read as radians: {phrase}; write radians"
-        warn_caller(UnitWarning(f"{path}: {message}"))
+        warn_caller(UnitWarning(f"{path}: {message}: {phrase}; {advice}"))
 
 
 def _check_expanded(root: Element, faults: Faults) -> None:

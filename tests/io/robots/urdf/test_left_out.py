@@ -215,6 +215,27 @@ def test_soft_limits_that_are_tighter_are_reported(tmp_path, ends, says):
 
 
 @pytest.mark.parametrize(
+    "unit, told",
+    [("kg m^2", False), ("kg cm^2", True), ("kg mm^2", True), ("g mm^2", True)],
+)
+def test_moments_of_inertia_in_small_units_are_told_of(tmp_path, unit, told):
+    """A rod of 2.3 kg and 0.6 m, whose moment is 0.069 kg m^2."""
+    size = {"kg m^2": 1.0, "kg cm^2": 1e4, "kg mm^2": 1e6, "g mm^2": 1e9}[unit]
+    moment = 2.3 * 0.6**2 / 12 * size
+    path = tmp_path / "rod.urdf"
+    path.write_text(f"""<robot name="rod"><link name="base"/><link name="rod"><inertial><origin xyz="0.3 0 0"/>
+<mass value="2.3"/>
+<inertia ixx="{moment / 100}" iyy="{moment}" izz="{moment}" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="pin" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>""")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        load_robot(path)
+    found = [str(x.message) for x in caught if issubclass(x.category, jn.errors.UnitWarning)]
+    assert len(found) == told
+    assert not told or f"all lies in 0.3 m: rod ({(0.03 * size) ** 0.5:.3g} m); write kg m^2" in found[0]
+
+
+@pytest.mark.parametrize(
     "lower, upper, told",
     [
         (-180, 180, True),
