@@ -63,6 +63,26 @@ def test_any_text_is_read_or_refused_politely(text):
     assert message.isascii()
 
 
+@pytest.mark.parametrize("a, b", [(3.0, -2.0), (-2.0, 3.0), (0.5, 4.0)])
+@pytest.mark.parametrize(
+    "function, called",
+    [
+        (max, "max(a, b)"),
+        (min, "min(a, b)"),
+        (math.pow, "pow(a, b)"),
+        (lambda a, b: float(a > 0), "heaviside(a)"),
+        (lambda a, b: math.log10(abs(a)), "log10(abs(a))"),
+        (lambda a, b: a if a - b > 0 else b, "where(a - b > 0, a, b)"),
+    ],
+)
+def test_functions_of_other_languages_are_refused_with_what_to_write(function, called, a, b):
+    with pytest.raises(ExpressionError, match="unknown function") as caught:
+        Expression(called.replace(" > 0", ""))
+    formula = str(caught.value).split("as ")[-1]
+    x = {"where(a - b > 0, a, b)": a - b, "heaviside(a)": a}.get(called, abs(a))
+    assert math.isclose(Expression(formula).evaluate({"a": a, "b": b, "x": x}), function(a, b), rel_tol=1e-15)
+
+
 @pytest.mark.parametrize(
     "text, column, words",
     [

@@ -29,6 +29,15 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
 }
 """Functions in every expression: number of arguments, and implementation for plain numbers."""
 
+_WRITTEN_AS = {
+    "max": "max(a, b) as (a + b + abs(a - b))/2",
+    "min": "min(a, b) as (a + b - abs(a - b))/2",
+    "heaviside": "a step at x = 0 as (1 + sign(x))/2",
+    "where": "a value a where x > 0, else b, as (a + b + (a - b)*sign(x))/2",
+    "pow": "pow(a, b) as a**b",
+    "log10": "log10(x) as log(x)/log(10)",
+}
+
 RESERVED = frozenset({"t", *CONSTANTS, *FUNCTIONS})
 """Names that no parameter can have."""
 
@@ -390,6 +399,7 @@ def _arguments(
     if name not in counts:
         matches = difflib.get_close_matches(name, counts, n=1)
         hint = f"did you mean '{matches[0]}'?" if matches else f"valid: {', '.join(counts)}"
+        hint = f"write {_WRITTEN_AS[name]}" if name in _WRITTEN_AS else hint
         _fail(f"unknown function '{name}'", column, text, hint)
     if keywords:
         _fail(f"a keyword in the arguments of {name} is not allowed", column, text)
