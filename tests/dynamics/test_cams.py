@@ -65,6 +65,18 @@ outputs:
   turning: {joint: swing, quantity: contact_torque}
   torque: {driver: shaft, quantity: torque}
 """
+OF_PARTS = IN_SPACE.replace(
+    "swing: {type: rotation, bodies: [ground, rocker]",
+    """weld: {type: fixed,
+    bodies: [rocker, lever], points: [[0, 0, 0], [0, 0, 0]], axes: [[1, 1, 0], [1, 1, 0]],
+    normals: [[0, 0, 1], [0, 0, 1]]}
+  swing: {type: rotation, bodies: [ground, lever]""",
+).replace(
+    "joints:",
+    """
+  lever: {position: [0.2, 0, 0], orientation: {axis: [1, 1, 0], angle: 50 deg}}
+joints:""",
+)
 SMOOTH = "expression: rise*(1 - cos(t))/2 + 0.001*sin(3*t)"
 RISES = (
     "profile: [{profile: cycloidal, duration: 120 deg, to: rise}, {profile: dwell, duration: 60 deg}, "
@@ -113,12 +125,12 @@ def test_contact_and_shaft_torque_with_rates(tmp_path, leader):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("leader", ["shaft", "theta"])
-def test_cams_in_space_know_angles_about_hinges(tmp_path, leader):
+@pytest.mark.parametrize("leader, text", [("shaft", IN_SPACE), ("theta", IN_SPACE), ("shaft", OF_PARTS)])
+def test_cams_in_space_know_angles_about_hinges(tmp_path, leader, text):
     """A tappet on the shaft, and a rocker that goes a turn with each of it: frames askew, many turns."""
     law = SMOOTH.replace("rise", "0.015")
     instants = [-0.4, 0.02, 0.13, 1.07]
-    motion = jn.solve(load(tmp_path, law, leader, IN_SPACE), instants, order=4)
+    motion = jn.solve(load(tmp_path, law, leader, text), instants, order=4)
 
     def angle(t):
         return 20 * t + mpmath.mpf("0.3") * mpmath.sin(5 * t)

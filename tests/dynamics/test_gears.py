@@ -77,6 +77,34 @@ def test_a_planetary_gear_loads_its_pins_and_bearings_as_its_free_bodies_say():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("turned", [None, 1.3], ids=["as guessed", "given"])
+def test_gears_on_welded_parts_turn_and_load_their_pins_as_on_one_part(turned):
+    """The planet on a plate that is welded to the carrier, the sun on a shaft: Willis, and the load on the pin."""
+    train = planetary(-7.0)
+    c, s = math.cos(1.3), math.sin(1.3)
+    plate, pin = [0.02 - 0.01 * c, -0.01 * s], [0.01 + 0.022 * c, -0.022 * s]  # the weld is at [0.01, 0] of the plate
+    train = dataclasses.replace(
+        train,
+        bodies={**train.rigid_bodies, "plate": jn.Body(plate, 1.3), "shaft": jn.Body(ZERO, -0.4)},
+        joints={
+            **train.joints,
+            "weld": planar.Fixed(("carrier", "plate"), [0.02, 0], [0.01, 0], turned),
+            "P": planar.Revolute(("plate", "planet"), pin, ZERO),
+            "key": planar.Fixed(("sun", "shaft"), ZERO, ZERO),
+            "S": planar.Revolute(("ground", "shaft"), ZERO, ZERO),
+        },
+    )
+    time = np.array([0.0, 0.1, 0.9])
+    motion = jn.solve(train, time, 2)
+    carrier = (20 * time + 3 * np.sin(6 * time)) * 24 / 84
+    np.testing.assert_allclose(motion.angle("carrier").values[:, 0], carrier, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(motion.angle("planet").values[:, 0], -carrier * 42 / 18, rtol=1e-12, atol=1e-13)
+    force = jn.joint_reaction(motion, "P", "planet").force.values[:, 0]
+    along = np.stack([np.sin(carrier), -np.cos(carrier)], axis=-1)  # the load holds the carrier back
+    np.testing.assert_allclose(force, 7 / 0.042 * along, rtol=1e-11, atol=1e-9)
+
+
+@pytest.mark.slow
 def test_where_the_load_passes_zero_rates_of_what_the_teeth_press_apart_are_not_reported():
     motion = jn.solve(planetary("-7 + 20*t"), [0.0, 0.35, 0.7], ORDER)
     reaction = jn.joint_reaction(motion, "S", "sun").force
@@ -250,6 +278,34 @@ def test_what_carries_shafts_is_reported_where_it_does_not():
     ):
         with pytest.raises(jn.errors.MechanismError, match=words):
             jn.solve(mechanism, [0.0], 1)
+
+
+@pytest.mark.slow
+def test_shafts_on_parts_that_are_welded_to_their_frame_turn_in_the_ratio():
+    """A wheel on a cap that is welded to a housing that turns, and a worm whose shaft is a part of its own."""
+    origin, cap = [0, 0, 0], [0.3, -0.5, 0.2]
+    bodies = dict.fromkeys(("housing", "cap", "worm", "shaft", "wheel"), jn.Body(origin))
+    worms = jn.Mechanism(
+        space="spatial",
+        bodies={**bodies, "cap": jn.Body(cap)},
+        joints={
+            "H": spatial.Revolute(("ground", "housing"), origin, origin, Y, Y),
+            "weld": spatial.Fixed(("housing", "cap"), cap, origin, [1, 1, 0], [1, 1, 0], Z, Z),
+            "A": spatial.Revolute(("housing", "shaft"), origin, origin, X, X),
+            "key": spatial.Fixed(("shaft", "worm"), origin, origin, [0, 1, 2], [0, 1, 2], X, X),
+            "B": spatial.Revolute(("cap", "wheel"), [-0.3, 0.5, -0.2], origin, Y, Y),
+            "mesh": spatial.Gear(("worm", "wheel", "housing"), X, Y, 3 / 40),
+        },
+        drivers={
+            "turn": drivers.RotationDriver(("ground", "housing"), Y, "2*t"),
+            "motor": drivers.RotationDriver(("housing", "worm"), X, "90*t + sin(t)"),
+        },
+        outputs={"wheel": jn.outputs.RelativeAngleOutput(("ground", "wheel"), Y)},
+    )
+    time = np.array([0.0, 0.4, 2.0])
+    found = jn.solve(worms, time, 1).outputs["wheel"]
+    np.testing.assert_allclose(found[:, 0], 2 * time + (90 * time + np.sin(time)) * 3 / 40, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found[:, 1], 2 + (90 + np.cos(time)) * 3 / 40, rtol=1e-12)
 
 
 def differential():

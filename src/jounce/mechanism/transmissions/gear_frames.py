@@ -1,8 +1,8 @@
 """Frames of gears: the body to which both centers are pinned, and the axes of shafts in the frame of their rotation.
 
 The centers of toothed gears, and of the pulleys of most belts, keep their distance if one body carries both. The pins
-show this body: a center is a point of every body that is pinned to it. The joints that hold directions parallel show
-the axis of a shaft in the frame m, and that of a pinion on its rack.
+and welds show this body: a center is a point of every body that is pinned or welded to it there. The joints that hold
+directions parallel show the axis of a shaft in the frame m, and that of a pinion on its rack.
 """
 
 import dataclasses
@@ -28,6 +28,7 @@ from jounce.mechanism.resolve import along_instances, resolve
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements, with_field
 from jounce.mechanism.transmissions.joined_points import (
     BodyVector,
+    Fixtures,
     Joined,
     as_array,
     body_vector,
@@ -38,6 +39,7 @@ from jounce.mechanism.transmissions.joined_points import (
     parallel,
     pinned,
     same_component,
+    welded,
 )
 from jounce.mechanism.transmissions.rope_lengths import check_ropes
 
@@ -108,12 +110,14 @@ def _find_arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, A
     toothed = {name: element for name, element in elements.items() if on_line(element)}
     if not toothed:
         return {}
-    pins = joined_vectors(mechanism, pinned)
-    arms = {name: _find_arm(name, element, mechanism.parameter_values, pins) for name, element in toothed.items()}
+    pins, parameters, welds = joined_vectors(mechanism, pinned), mechanism.parameter_values, welded(mechanism)
+    arms = {name: _find_arm(name, element, parameters, pins, welds) for name, element in toothed.items()}
     return {name: arm for name, arm in arms.items() if arm is not None}
 
 
-def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[str, Any], pins: Joined) -> Arm | None:
+def _find_arm(
+    name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[str, Any], pins: Joined, welds: Fixtures
+) -> Arm | None:
     try:
         radii = [resolve(radius, parameters) for radius in (gear.radius_i, gear.radius_j)]
         points = [
@@ -133,7 +137,7 @@ def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[st
         pairs = zip(a.value, b.value, a.given, b.given, strict=True)
         return all(same_component(x, y, of_x, of_y, same) for x, y, of_x, of_y in pairs)
 
-    first, second = (on_joined_bodies(point, pins, coincide) for point in points)
+    first, second = (on_joined_bodies(point, pins, coincide, welds) for point in points)
     shared = [body for body in first if body in second and body not in gear.bodies]
     if not shared:
         return None
@@ -236,11 +240,12 @@ def _number(value: Any) -> Any:
 def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism) -> Group:
     """Return spatial gears with the axes of their shafts in the frames, if known, and whole turns."""
     hinges, parameters = joined_vectors(mechanism, held_parallel), mechanism.parameter_values
+    attitudes = constant_attitudes(mechanism)
     for slot, field in enumerate(("held_i", "held_j")):
         data = []
         for gear in gears:
             axis = body_vector(gear.bodies[slot], (gear.axis_i, gear.axis_j)[slot], parameters)
-            frame_axis = on_joined_bodies(axis, hinges, parallel).get(gear.bodies[2])
+            frame_axis = on_joined_bodies(axis, hinges, parallel, attitudes).get(gear.bodies[2])
             if frame_axis is None:
                 break
             data.append((as_array(axis.value), as_array(frame_axis.value)))
@@ -332,15 +337,17 @@ def _same_direction(first: Any, second: Any) -> bool:
 
 def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group:
     """Return cams whose spatial angles have their axes on both bodies, if known."""
-    hinges = None
+    hinges, attitudes = None, ()
     for field in ("follower", "leader"):
         if not turns_in_space(getattr(group.element, field)):
             continue
-        hinges = joined_vectors(mechanism, held_parallel) if hinges is None else hinges
+        if hinges is None:
+            hinges, attitudes = joined_vectors(mechanism, held_parallel), constant_attitudes(mechanism)
         parts = [getattr(cam, field) for cam in cams]
         axes = [body_vector(part.bodies[0], part.axis_i, mechanism.parameter_values) for part in parts]
         other_axes = [
-            on_joined_bodies(axis, hinges, parallel).get(part.bodies[1]) for axis, part in zip(axes, parts, strict=True)
+            on_joined_bodies(axis, hinges, parallel, attitudes).get(part.bodies[1])
+            for axis, part in zip(axes, parts, strict=True)
         ]
         if any(other is None for other in other_axes):
             continue

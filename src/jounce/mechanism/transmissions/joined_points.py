@@ -11,6 +11,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
+from jounce.constraints import planar
 from jounce.constraints.facts import PAIRS, facts_of
 from jounce.errors import JounceError
 from jounce.mechanism.mechanism import Mechanism
@@ -27,15 +28,19 @@ class BodyVector(NamedTuple):
     given: tuple[Any, ...]
 
 
-class Triad(NamedTuple):
-    """Three orthonormal directions of a body, in the rows of a matrix."""
+class Axes(NamedTuple):
+    """Orthonormal directions of a body, in the rows of a matrix, and, for points, the origin of the axes."""
 
     body: str
-    triad: Float[np.ndarray, "3 3"]
+    directions: Float[np.ndarray, "axis component"]
+    origin: Any = 0.0
 
 
 Joined = Sequence[tuple[BodyVector, BodyVector]]
 """Pairs of points or directions that a joint holds together."""
+
+Fixtures = Sequence[tuple[Axes, Axes]]
+"""Common axes of two bodies whose relative attitude, or for points pose, is constant."""
 
 
 def joined_vectors(
@@ -56,7 +61,7 @@ def joined_vectors(
     return pairs
 
 
-def constant_attitudes(mechanism: Mechanism) -> list[tuple[Triad, Triad]]:
+def constant_attitudes(mechanism: Mechanism) -> list[tuple[Axes, Axes]]:
     """Return pairs of bodies with a constant relative attitude, by joints that hold two directions of each parallel."""
     attitude_pairs = []
     for joint in mechanism.joints.values():
@@ -74,8 +79,32 @@ def constant_attitudes(mechanism: Mechanism) -> list[tuple[Triad, Triad]]:
             continue
         triads = [_triad(*(np.asarray(vector, float) for vector in part[:2])) for part in vectors]
         if all(np.isfinite(triad).all() for triad in triads):
-            attitude_pairs.append(tuple(Triad(*pair) for pair in zip(joint.bodies, triads, strict=False)))
+            attitude_pairs.append(tuple(Axes(*pair) for pair in zip(joint.bodies, triads, strict=False)))
     return attitude_pairs
+
+
+def welded(mechanism: Mechanism) -> list[tuple[Axes, Axes]]:
+    """Return the axes of the first of each two planar bodies that a weld holds together, on both of them."""
+    parameters, bodies = mechanism.parameter_values, mechanism.bodies
+    axes_pairs = []
+    for weld in mechanism.joints.values():
+        if not isinstance(weld, planar.Fixed):
+            continue
+        try:
+            points = [
+                body_vector(*pair, parameters).value
+                for pair in zip(weld.bodies, (weld.point_i, weld.point_j), strict=True)
+            ]
+            first, second = (resolve(bodies[body].angle, parameters) if body in bodies else 0.0 for body in weld.bodies)
+            turned = second - first if weld.offset is None else resolve(weld.offset, parameters)
+        except JounceError:
+            continue
+        if any(isinstance(x, Tracer) for x in (turned, *points[0], *points[1])):
+            continue
+        on_second = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
+        sides = zip(weld.bodies, (np.eye(2), on_second), np.asarray(points), strict=True)
+        axes_pairs.append(tuple(Axes(*side) for side in sides))
+    return axes_pairs
 
 
 def _triad(axis: Float[np.ndarray, " 3"], normal: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
@@ -125,7 +154,7 @@ def on_joined_bodies(
     start: BodyVector,
     joined: Joined,
     match: Callable[[BodyVector, BodyVector], int | bool],
-    fixed: Sequence[tuple[Triad, Triad]] = (),
+    fixed: Fixtures = (),
 ) -> dict[str, BodyVector]:
     """Return a point or direction on each body to which a chain of joints connects it.
 
@@ -137,8 +166,9 @@ def on_joined_bodies(
         Pairs of points or directions that joints hold together.
     match : callable
         Returns whether two vectors of a body are the same: 1, or -1 for opposite directions.
-    fixed : sequence of tuple of Triad, optional
-        Pairs of bodies whose relative attitude is constant: every direction is then known on both.
+    fixed : sequence of tuple of Axes, optional
+        Common axes of two bodies whose relative attitude, or for points pose, is constant: every direction, or point,
+        is then known on both.
     """
     reached, pending = {start.body: start}, [start]
     while pending:
@@ -154,8 +184,9 @@ def on_joined_bodies(
         for first, second in () if any(isinstance(x, Tracer) for x in vector.value) else fixed:
             for near, far in ((first, second), (second, first)):
                 if near.body == vector.body and far.body not in reached:
-                    image = far.triad.T @ (near.triad @ np.asarray(vector.value, float))
-                    reached[far.body] = BodyVector(far.body, tuple(image.tolist()), tuple(image.tolist()))
+                    from_origin = np.asarray(vector.value, float) - near.origin
+                    image = tuple((far.origin + far.directions.T @ (near.directions @ from_origin)).tolist())
+                    reached[far.body] = BodyVector(far.body, image, image)
                     pending.append(reached[far.body])
     return reached
 
