@@ -189,6 +189,29 @@ def test_gears_that_do_not_mesh_are_refused(name, changes, words):
 
 
 @pytest.mark.slow
+def test_a_gear_that_is_welded_to_its_shaft_presses_on_the_bearing_of_the_shaft():
+    """As a spur gear of one piece with it; its point is checked against the hinge of the shaft."""
+    axes, centers, *others = GEARS["spur"][:4]
+    whole, end = pair(axes, centers, *others), [0.05, -0.2, 0.1]  # the origin of the gear, in the frame of the shaft
+    bearing = dataclasses.replace(whole.joints["B"], bodies=("ground", "shaft"))
+    key = spatial.Fixed(("shaft", "j"), end, ZERO, [1, 2, 0], [1, 2, 0], Z, Z)
+
+    def keyed(point):
+        mesh = dataclasses.replace(whole.joints["mesh"], point_j=point)
+        bodies = {**whole.rigid_bodies, "shaft": whole.bodies["j"], "j": jn.Body(TURNED @ centers[1] + end)}
+        return dataclasses.replace(
+            whole, bodies=bodies, joints={**whole.joints, "B": bearing, "key": key, "mesh": mesh}
+        )
+
+    motion = jn.solve(keyed((-np.array(end)).tolist()), [0.1, 0.8], order=2)
+    expected = [-float(load(t)) / 0.2 * (TURNED @ [SLOPE, 1, 0]) for t in (0.1, 0.8)]
+    force = jn.joint_reaction(motion, "B", "shaft").force.values[:, 0]
+    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-11 * 40)
+    with pytest.raises(jn.errors.MechanismError, match=r"this point of 'j' is .* m from the axis of its hinge"):
+        jn.solve(keyed(ZERO), [0.1])
+
+
+@pytest.mark.slow
 def test_a_crown_wheel_has_no_hand_of_its_own():
     slanted = [math.sqrt(15) / 4, 0, 1 / 4]
     crown = pair(([0, 0, 1], slanted), (ZERO, ZERO), [0.2, 0, 0], 4, helix_angle=0.1, turned=np.eye(3))

@@ -256,37 +256,39 @@ def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism
 
 
 def _check_points_on_axes(gears: Mapping[str, spatial.Gear], mechanism: Mechanism) -> None:
-    """Raise MechanismError if a point on the axis of a gear is not on the axis of any hinge of its body."""
-    parameters = mechanism.parameter_values
-    hinges = [joint for joint in mechanism.joints.values() if _is_hinge(type(joint))]
+    """Raise MechanismError if a point on the axis of a gear is not on the axis of any of its hinges."""
+    parameters, fixed = mechanism.parameter_values, (constant_attitudes(mechanism), welded(mechanism))
+    hinges = [
+        [body_vector(body, getattr(joint, field + side), parameters) for field in ("axis", "point")]
+        for joint in mechanism.joints.values()
+        if _is_hinge(type(joint))
+        for body, side in zip(joint.bodies, ("_i", "_j"), strict=True)
+    ]
     for name, gear in gears.items():
         if gear.point_m is None:
             continue
         for slot, suffix in enumerate(("_i", "_j")):
-            body, given = gear.bodies[slot], [getattr(gear, field + suffix) for field in ("axis", "point")]
-            lines = [
-                [getattr(hinge, field + ("_i", "_j")[hinge.bodies.index(body)]) for field in ("axis", "point")]
-                for hinge in hinges
-                if body in hinge.bodies
+            body = gear.bodies[slot]
+            line = [body_vector(body, getattr(gear, field + suffix), parameters) for field in ("axis", "point")]
+            axes, points = (on_joined_bodies(x, (), parallel, held) for x, held in zip(line, fixed, strict=True))
+            on_shaft = [
+                (*hinge, axes[hinge[0].body], points[hinge[0].body]) for hinge in hinges if hinge[0].body in points
             ]
-            values = [[body_vector(body, vector, parameters).value for vector in line] for line in (given, *lines)]
-            if any(isinstance(x, Tracer) for line in values for vector in line for x in vector):
+            if any(isinstance(x, Tracer) for vectors in (line, *on_shaft) for vector in vectors for x in vector.value):
                 continue
-            (axis, point), *hinge_lines = np.asarray(values, float)
-            axis = axis / np.linalg.norm(axis)
-            offsets = [
-                hinge_point - point
-                for hinge_axis, hinge_point in hinge_lines
-                if np.linalg.norm(np.cross(axis, hinge_axis)) <= ACROSS * np.linalg.norm(hinge_axis)
-            ]
-            sizes = [np.linalg.norm(x) + np.linalg.norm(point) for x in offsets]
-            distances = [np.linalg.norm(np.cross(axis, x)) for x in offsets]
+            distances, sizes = [], []
+            for vectors in on_shaft:
+                hinge_axis, hinge_point, axis, point = (np.asarray(vector.value, float) for vector in vectors)
+                axis = axis / np.linalg.norm(axis)
+                if np.linalg.norm(np.cross(axis, hinge_axis)) <= ACROSS * np.linalg.norm(hinge_axis):
+                    distances.append(np.linalg.norm(np.cross(axis, hinge_point - point)))
+                    sizes.append(np.linalg.norm(hinge_point - point) + np.linalg.norm(point))
             if distances and all(a > LARGEST_GAP * size for a, size in zip(distances, sizes, strict=True)):
                 message = (
                     f"this point of '{body}' is {min(distances):.6g} m from the axis of its hinge: "
                     "give one that is on it"
                 )
-                raise MechanismError(message, name=f"{name}.points", value=point.tolist())
+                raise MechanismError(message, name=f"{name}.points", value=list(line[1].value))
 
 
 def _is_hinge(kind: type[Any]) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
-from jounce.constraints import planar
+from jounce.constraints import planar, spatial
 from jounce.constraints.facts import PAIRS, facts_of
 from jounce.errors import JounceError
 from jounce.mechanism.mechanism import Mechanism
@@ -63,48 +63,60 @@ def joined_vectors(
 
 def constant_attitudes(mechanism: Mechanism) -> list[tuple[Axes, Axes]]:
     """Return pairs of bodies with a constant relative attitude, by joints that hold two directions of each parallel."""
-    attitude_pairs = []
-    for joint in mechanism.joints.values():
-        pairs = held_parallel(joint)
-        if len(pairs) < 2:
-            continue
-        try:
-            vectors = [
-                [body_vector(body, getattr(joint, pair[slot]), mechanism.parameter_values).value for pair in pairs]
-                for slot, body in enumerate(joint.bodies[:2])
-            ]
-        except JounceError:
-            continue
-        if any(isinstance(x, Tracer) for part in vectors for vector in part for x in vector):
-            continue
-        triads = [_triad(*(np.asarray(vector, float) for vector in part[:2])) for part in vectors]
-        if all(np.isfinite(triad).all() for triad in triads):
-            attitude_pairs.append(tuple(Axes(*pair) for pair in zip(joint.bodies, triads, strict=False)))
-    return attitude_pairs
+    attitude_pairs = (_held_axes(joint, mechanism.parameter_values) for joint in mechanism.joints.values())
+    return [pair for pair in attitude_pairs if pair is not None]
+
+
+def _held_axes(joint: Any, parameters: Mapping[str, Any]) -> tuple[Axes, Axes] | None:
+    """Return axes that a joint holds parallel on its two bodies; None if it leaves a rotation, or they are traced."""
+    pairs = held_parallel(joint)
+    if len(pairs) < 2:
+        return None
+    try:
+        vectors = [
+            [body_vector(body, getattr(joint, pair[slot]), parameters).value for pair in pairs]
+            for slot, body in enumerate(joint.bodies[:2])
+        ]
+    except JounceError:
+        return None
+    if any(isinstance(x, Tracer) for part in vectors for vector in part for x in vector):
+        return None
+    first, second = (_triad(*(np.asarray(vector, float) for vector in part[:2])) for part in vectors)
+    if not (np.isfinite(first).all() and np.isfinite(second).all()):
+        return None
+    return Axes(joint.bodies[0], first), Axes(joint.bodies[1], second)
 
 
 def welded(mechanism: Mechanism) -> list[tuple[Axes, Axes]]:
-    """Return the axes of the first of each two planar bodies that a weld holds together, on both of them."""
-    parameters, bodies = mechanism.parameter_values, mechanism.bodies
-    axes_pairs = []
-    for weld in mechanism.joints.values():
-        if not isinstance(weld, planar.Fixed):
+    """Return axes that a weld holds together, with their origins, on each of its two bodies."""
+    parameters = mechanism.parameter_values
+    welds = []
+    for joint in mechanism.joints.values():
+        if not isinstance(joint, planar.Fixed | spatial.Fixed):
             continue
         try:
             points = [
                 body_vector(*pair, parameters).value
-                for pair in zip(weld.bodies, (weld.point_i, weld.point_j), strict=True)
+                for pair in zip(joint.bodies, (joint.point_i, joint.point_j), strict=True)
             ]
-            first, second = (resolve(bodies[body].angle, parameters) if body in bodies else 0.0 for body in weld.bodies)
-            turned = second - first if weld.offset is None else resolve(weld.offset, parameters)
+            axes = _held_axes(joint, parameters) if isinstance(joint, spatial.Fixed) else _turned(joint, mechanism)
         except JounceError:
             continue
-        if any(isinstance(x, Tracer) for x in (turned, *points[0], *points[1])):
-            continue
-        on_second = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
-        sides = zip(weld.bodies, (np.eye(2), on_second), np.asarray(points), strict=True)
-        axes_pairs.append(tuple(Axes(*side) for side in sides))
-    return axes_pairs
+        if axes is not None and not any(isinstance(x, Tracer) for point in points for x in point):
+            first, second = (part._replace(origin=np.asarray(x)) for part, x in zip(axes, points, strict=True))
+            welds.append((first, second))
+    return welds
+
+
+def _turned(weld: planar.Fixed, mechanism: Mechanism) -> tuple[Axes, Axes] | None:
+    """Return the axes of the first body of a planar weld, on both of its bodies; None if they are traced."""
+    parameters, bodies = mechanism.parameter_values, mechanism.bodies
+    first, second = (resolve(bodies[body].angle, parameters) if body in bodies else 0.0 for body in weld.bodies)
+    angle = second - first if weld.offset is None else resolve(weld.offset, parameters)
+    if isinstance(angle, Tracer):
+        return None
+    c, s = np.cos(angle), np.sin(angle)
+    return Axes(weld.bodies[0], np.eye(2)), Axes(weld.bodies[1], np.array([[c, -s], [s, c]]))
 
 
 def _triad(axis: Float[np.ndarray, " 3"], normal: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:

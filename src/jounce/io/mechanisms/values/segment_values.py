@@ -68,7 +68,8 @@ def leader(raw: dict[str, Any], info: Any) -> str | Expression | None:
         raise problem(f"must be the name of a driver, a joint, or an output; {message}", "of", value=given)
     if given in context.get("leaders", ()) and given not in context.get("names", ()):
         message = (
-            "is not a driver, and only a cam, which is a joint, follows what is not driven; write this law under joints"
+            "is not a driver, and only a cam, which is a joint, follows what is not driven: write the law of a driver "
+            "under joints, and that of a force with x, its displacement"
         )
         raise problem(message, "of", value=given)
     value = parse(given, "any", info, "of", variables={"t": None}).value
