@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import difflib
 import keyword
 import math
 import numbers
@@ -16,6 +15,7 @@ from functools import lru_cache
 from typing import Any, NoReturn
 
 from jounce.errors import ExpressionError, JounceError, did_you_mean, show_value
+from jounce.units.function_hints import function_hint
 
 CONSTANTS: dict[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
 """Constants in every expression."""
@@ -28,15 +28,6 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     "sign": (1, lambda x: float((x > 0) - (x < 0))),
 }
 """Functions in every expression: number of arguments, and implementation for plain numbers."""
-
-_WRITTEN_AS = {
-    "max": "max(a, b) as (a + b + abs(a - b))/2",
-    "min": "min(a, b) as (a + b - abs(a - b))/2",
-    "heaviside": "a step at x = 0 as (1 + sign(x))/2",
-    "where": "a value a where x > 0, else b, as (a + b + (a - b)*sign(x))/2",
-    "pow": "pow(a, b) as a**b",
-    "log10": "log10(x) as log(x)/log(10)",
-}
 
 RESERVED = frozenset({"t", *CONSTANTS, *FUNCTIONS})
 """Names that no parameter can have."""
@@ -397,10 +388,7 @@ def _arguments(
 ) -> list[ast.AST]:
     """Return the arguments of a function, after a check that it exists and accepts their number."""
     if name not in counts:
-        matches = difflib.get_close_matches(name, counts, n=1)
-        hint = f"did you mean '{matches[0]}'?" if matches else f"valid: {', '.join(counts)}"
-        hint = f"write {_WRITTEN_AS[name]}" if name in _WRITTEN_AS else hint
-        _fail(f"unknown function '{name}'", column, text, hint)
+        _fail(f"unknown function '{name}'", column, text, function_hint(name, counts))
     if keywords:
         _fail(f"a keyword in the arguments of {name} is not allowed", column, text)
     if len(arguments) not in counts[name]:
