@@ -202,6 +202,7 @@ def test_an_event_that_is_none(keywords, words):
     "events, words",
     [
         (height(), "must be a list of jn.Event"),
+        ("psi", "must be a list of jn.Event"),  # its letters are not taken for events
         (["landing"], "must be a jn.Event"),
         ([jn.Event(jn.outputs.AngleOutput("stone"), component=1)], "has 1 component, counted from 0, got 1"),
         ([jn.Event(jn.outputs.AngleOutput("ston"))], "did you mean 'stone'"),

@@ -141,7 +141,7 @@ def simulate(
     order, method = checked_options(order, method, tolerance, longest_step)
     if progress is not None and not callable(progress):
         raise MechanismError("must be a function of two numbers", name="progress", value=progress)
-    if not isinstance(events, Sequence):
+    if isinstance(events, str) or not isinstance(events, Sequence):
         raise MechanismError("must be a list of jn.Event", name="events", value=events)
     check_robot_options(mechanism, robot)
     if isinstance(mechanism, Robot) and initial is not None:
