@@ -91,6 +91,7 @@ def test_a_row_of_units_below_the_names_is_read(tmp_path, row, size):
         ("time,lift\nms,mmm\n0,1\n", "line 2, time: must be a finite number, got 'ms'"),
         ("time [ms],lift\nms,mm\n0,1\n", "line 2, time: must be a finite number, got 'ms'"),
         ("time,lift\nms,2\n0,1\n", "line 2, time: must be a finite number, got 'ms'"),
+        ("time,lift\n-,-\n0,1\n", "line 2, time: must be a finite number, got '-'"),
     ],
 )
 def test_rows_that_state_no_units_of_the_columns_are_refused(tmp_path, text, said):

@@ -26,7 +26,7 @@ COMMENT = "# "
 ROW_NUMBER = "(row)"
 """Name for an unnamed first column of row numbers, as pandas writes it; it is not read."""
 
-UNITLESS = ("", "-")
+UNITLESS = {"", "-"}
 """Entries of a row of units for columns without one."""
 
 _RATE = re.compile(r"_d([0-9]{1,2})$")
@@ -264,10 +264,10 @@ class Table:
         self.units_line = self.header_line
 
     def _take_row_of_units(self) -> None:
-        """Take the units of columns from the row below the names, if it has no numbers and the names no units."""
+        """Take the units of columns from the row below the names, if the names have none and it states at least one."""
         line, row = self.rows[0] if self.rows else (0, [])
         units = [entry.strip("[]() ") for entry in row]
-        if len(row) == len(self.header) and not any(self.units) and all(_is_unit(unit) for unit in units):
+        if {*units} - UNITLESS and len(row) == len(self.header) and not any(self.units) and all(map(_is_unit, units)):
             self.units, self.units_line = [None if unit in UNITLESS else unit for unit in units], line
             del self.rows[0]
 
